@@ -1,0 +1,157 @@
+//! `tyndall info`: what a scene or an image holds.
+
+use super::not_built;
+use crate::args::InfoArgs;
+use crate::error::CliError;
+use crate::output;
+use tyndall_render::image_file::read_image;
+use tyndall_render::info::{ImageInfo, LightInfo, SceneInfo};
+use tyndall_scene::LoadOptions;
+
+/// Lights listed one by one in the text; scenes can have thousands.
+const LIGHTS_SHOWN: usize = 24;
+
+pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
+    let ending = args
+        .file
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
+    match ending.as_str() {
+        "ron" | "glb" | "gltf" => {
+            let options = LoadOptions {
+                bare_gltf: true,
+                ..args.source.load_options()
+            };
+            let scene = SceneInfo::of(&tyndall_scene::load(&args.file, &options)?);
+            if args.json {
+                output::print_json(&scene)
+            } else {
+                output::print(&scene_text(&scene))
+            }
+        }
+        "exr" | "png" | "hdr" | "jpg" | "jpeg" => {
+            let image = ImageInfo::of(&read_image(&args.file)?);
+            if args.json {
+                output::print_json(&image)
+            } else {
+                output::print(&image_text(&image))
+            }
+        }
+        "vdb" | "nvdb" | "vol" => Err(not_built(
+            "reading volume files",
+            "describe the fog by Constant or Height density in a scene file",
+        )),
+        _ => Err(CliError::UnknownKind {
+            path: args.file.display().to_string(),
+        }),
+    }
+}
+
+fn scene_text(scene: &SceneInfo) -> String {
+    let mut lines = vec![
+        format!("film       {} × {} pixels", scene.film[0], scene.film[1]),
+        format!(
+            "camera     at {} m, looking along {}, vfov {:.2}°",
+            triple(scene.eye),
+            triple(scene.forward),
+            scene.vfov_degrees
+        ),
+        match scene.bounds_m {
+            Some([min, max]) => format!("bounds     {} to {} m", triple(min), triple(max)),
+            None => "bounds     none".to_owned(),
+        },
+        format!(
+            "surfaces   {} triangles, {} materials, {} textures",
+            scene.triangles, scene.materials, scene.textures
+        ),
+        format!(
+            "memory     {:.1} MiB meshes, {:.1} MiB textures, {:.1} MiB search tree",
+            scene.mesh_mib, scene.texture_mib, scene.search_tree_mib
+        ),
+        format!("lights     {}", scene.lights.len()),
+    ];
+    lines.extend(scene.lights.iter().take(LIGHTS_SHOWN).map(light_line));
+    if scene.lights.len() > LIGHTS_SHOWN {
+        lines.push(format!(
+            "  and {} more (--json lists all)",
+            scene.lights.len() - LIGHTS_SHOWN
+        ));
+    }
+    lines.push(format!("media      {}", scene.media.len()));
+    for medium in &scene.media {
+        let path = |p: Option<f32>| p.map_or("∞".to_owned(), |p| format!("{p:.4}"));
+        lines.push(format!(
+            "  {}  in {}, density {}, phase {}",
+            medium.name, medium.region, medium.density, medium.phase
+        ));
+        lines.push(format!(
+            "    mean free path ({}) m, σt {} /m, albedo {}, emission {} W/(m³ sr)",
+            medium.mean_free_path_m.map(path).join(", "),
+            triple(medium.sigma_t_per_m),
+            triple(medium.albedo),
+            triple(medium.emission_w_m3_sr),
+        ));
+    }
+    lines.extend(
+        scene
+            .warnings
+            .iter()
+            .map(|warning| format!("warning: {warning}")),
+    );
+    lines.join("\n")
+}
+
+fn light_line(light: &LightInfo) -> String {
+    let parts = [
+        light.position_m.map(|v| format!("at {} m", triple(v))),
+        light.power_w.map(|v| format!("{} W", triple(v))),
+        light.intensity_w_sr.map(|v| format!("{} W/sr", triple(v))),
+        light.irradiance_w_m2.map(|v| format!("{} W/m²", triple(v))),
+        light
+            .radiance_w_m2_sr
+            .map(|v| format!("{} W/(m² sr)", triple(v))),
+        light.area_m2.map(|area| format!("{area:.4} m²")),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    format!("  {}  {}", light.kind, parts.join(", "))
+}
+
+fn image_text(image: &ImageInfo) -> String {
+    let mut lines = vec![format!(
+        "size       {} × {} pixels",
+        image.size[0], image.size[1]
+    )];
+    if image.frame != image.size || image.origin != [0, 0] {
+        let [x, y] = image.origin;
+        lines.push(format!(
+            "crop       starts at ({x}, {y}) of a frame of {} × {}",
+            image.frame[0], image.frame[1]
+        ));
+    }
+    let width = image
+        .channels
+        .iter()
+        .map(|channel| channel.name.len())
+        .max()
+        .unwrap_or(0);
+    for c in &image.channels {
+        let number = |n: Option<f64>| n.map_or("-".to_owned(), |n| format!("{n:.6}"));
+        let (min, mean, max) = (
+            number(c.min.map(f64::from)),
+            number(c.mean),
+            number(c.max.map(f64::from)),
+        );
+        let name = &c.name;
+        lines.push(format!(
+            "{name:<width$}  min {min}  mean {mean}  max {max}  nan {}  inf {}",
+            c.nan, c.inf
+        ));
+    }
+    lines.join("\n")
+}
+
+fn triple(v: [f32; 3]) -> String {
+    format!("({:.4}, {:.4}, {:.4})", v[0], v[1], v[2])
+}

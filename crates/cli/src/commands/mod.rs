@@ -1,0 +1,45 @@
+//! One module per command.
+
+mod compare;
+mod info;
+mod render;
+
+use crate::args::{Command, SourceArgs};
+use crate::error::CliError;
+use tyndall_render::error::RenderError;
+use tyndall_scene::LoadOptions;
+
+/// Does what the command line asks for.
+pub(crate) fn run(command: &Command) -> Result<(), CliError> {
+    match command {
+        Command::Render(args) => render::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Probe(_) => Err(not_built(
+            "`tyndall probe`",
+            "render the scene with --layers single,multiple instead",
+        )),
+        Command::Verify(_) => Err(not_built(
+            "`tyndall verify`",
+            "the exact benchmarks run in the project's test suite",
+        )),
+    }
+}
+
+fn not_built(what: &str, instead: &str) -> CliError {
+    RenderError::NotBuilt {
+        what: what.to_owned(),
+        instead: instead.to_owned(),
+    }
+    .into()
+}
+
+impl SourceArgs {
+    fn load_options(&self) -> LoadOptions {
+        LoadOptions {
+            allow_external: self.allow_external,
+            fog: self.fog,
+            ..LoadOptions::default()
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! `tyndall render`: from a scene file to image files.
+
+use super::not_built;
+use crate::args::RenderArgs;
+use crate::error::CliError;
+use crate::output;
+use crate::progress::Bar;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tyndall_render::image_file::{WriteOptions, check_place, check_writable, write_image};
+use tyndall_render::options::RenderOptions;
+use tyndall_render::{Outcome, render};
+use tyndall_scene::LoadOptions;
+
+pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
+    let start = Instant::now();
+    if args.cache_in.is_some() || args.cache_out.is_some() {
+        return Err(not_built(
+            "keeping records in a file (--cache-in, --cache-out)",
+            "leave the option out: records are computed anew",
+        ));
+    }
+    let options = render_options(args);
+    options.check()?;
+    let outputs = outputs(args);
+    for path in &outputs {
+        check_writable(path)?;
+    }
+    if let Some(path) = &args.stats {
+        check_place(path)?;
+    }
+
+    let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
+    output::warn(&scene.warnings);
+    let load_s = start.elapsed().as_secs_f64();
+
+    let bar = Bar::new(args.quiet);
+    let outcome = render(&scene, &options, &bar);
+    bar.finish();
+    let mut outcome = outcome?;
+    output::warn(&outcome.notes);
+
+    let write = WriteOptions {
+        exposure: scene.settings.exposure,
+        metadata: Some(metadata(args, &outcome)),
+    };
+    for path in &outputs {
+        write_image(path, &outcome.image, &write)?;
+    }
+    outcome.stats.load_s = load_s;
+    outcome.stats.wall_s = start.elapsed().as_secs_f64();
+    if let Some(path) = &args.stats {
+        outcome.stats.write(path)?;
+    }
+    if !args.quiet {
+        let stats = &outcome.stats;
+        output::say(&outcome.summary);
+        output::say(&format!(
+            "{:.1} s on {} threads, {:.1} samples per pixel",
+            stats.wall_s, stats.threads, stats.spp
+        ));
+        for path in &outputs {
+            output::say(&format!("wrote {}", path.display()));
+        }
+    }
+    Ok(())
+}
+
+/// The files to write. Without a choice it is one beside the user, and not named like a scene's own images might be.
+fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
+    if !args.output.is_empty() {
+        return args.output.clone();
+    }
+    let mut name = args.scene.file_stem().unwrap_or_default().to_owned();
+    name.push("-render.exr");
+    vec![Path::new(&name).to_owned()]
+}
+
+fn load_options(args: &RenderArgs) -> LoadOptions {
+    // One side given alone keeps the scene's proportions, which only the renderer knows how to do.
+    let [width, height] = if args.width.is_some() && args.height.is_some() {
+        [args.width, args.height]
+    } else {
+        [None, None]
+    };
+    LoadOptions {
+        width,
+        height,
+        ..args.source.load_options()
+    }
+}
+
+fn render_options(args: &RenderArgs) -> RenderOptions {
+    RenderOptions {
+        integrator: args.integrator.0,
+        error: args.error,
+        spp: args.spp,
+        width: args.width,
+        height: args.height,
+        crop: args.crop,
+        max_depth: args.max_depth,
+        seed: args.seed,
+        threads: args.threads,
+        time_limit: args.time_limit,
+        layers: args.layers.clone(),
+    }
+}
+
+/// How the image came about, as RON for the EXR file. The number of threads and times stay out: they do not shape the image.
+fn metadata(args: &RenderArgs, outcome: &Outcome) -> String {
+    format!(
+        "(version: {:?}, integrator: {:?}, seed: {}, spp: {:?}, summary: {:?})",
+        env!("CARGO_PKG_VERSION"),
+        args.integrator.0.name(),
+        args.seed,
+        outcome.stats.spp,
+        outcome.summary,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+    use super::*;
+    use crate::args::{Cli, Command};
+    use clap::Parser;
+
+    fn args(line: &str) -> RenderArgs {
+        match Cli::try_parse_from(format!("tyndall render {line}").split_whitespace())
+            .unwrap()
+            .command
+        {
+            Command::Render(args) => args,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn an_image_without_a_name_is_named_after_the_scene_in_the_current_folder() {
+        assert_eq!(
+            outputs(&args("some/folder/sky.ron")),
+            [PathBuf::from("sky-render.exr")]
+        );
+        assert_eq!(
+            outputs(&args("sky.ron -o x.png -o x.exr")),
+            [PathBuf::from("x.png"), PathBuf::from("x.exr")]
+        );
+    }
+
+    #[test]
+    fn one_side_given_alone_is_left_to_the_renderer() {
+        let one = args("sky.ron --width 64");
+        assert_eq!(
+            (load_options(&one).width, render_options(&one).width),
+            (None, Some(64))
+        );
+        let both = args("sky.ron --width 64 --height 32");
+        assert_eq!(
+            (load_options(&both).width, load_options(&both).height),
+            (Some(64), Some(32))
+        );
+    }
+
+    #[test]
+    fn files_of_records_are_refused_with_a_reason() {
+        let error = run(&args("sky.ron --cache-in records.tyc")).unwrap_err();
+        assert!(error.to_string().contains("not built yet"), "{error}");
+        assert_eq!(error.status(), 2);
+    }
+
+    #[test]
+    fn bad_options_and_places_are_found_before_the_scene_is_opened() {
+        for line in [
+            "none.ron --spp 0",
+            "none.ron -o picture.jpg",
+            "none.ron -o no-such-folder/x.exr",
+            "none.ron -o x.exr --stats no-such-folder/s.json",
+        ] {
+            let error = run(&args(line)).unwrap_err();
+            assert!(matches!(error, CliError::Render(_)), "{line}: {error}");
+            assert_eq!(error.status(), 2);
+        }
+    }
+}

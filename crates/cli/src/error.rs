@@ -1,0 +1,66 @@
+//! What ends the command, and with which exit status.
+
+use tyndall_render::error::RenderError;
+use tyndall_scene::SceneError;
+
+/// Why the command could not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CliError {
+    /// A scene could not be loaded.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A render, a comparison or an image file failed.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// `tyndall info` was given a file of a kind it does not know.
+    #[error(
+        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images)"
+    )]
+    UnknownKind {
+        /// The file.
+        path: String,
+    },
+    /// Standard output is closed or full.
+    #[error("cannot write to standard output: {0}")]
+    Output(std::io::Error),
+    /// A bug of ours.
+    #[error("internal error, please report it with the command and the scene: {0}")]
+    Internal(String),
+}
+
+impl CliError {
+    /// 2 where the command or an input file is wrong, 1 for anything else.
+    pub(crate) fn status(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::UnknownKind { .. } => 2,
+            Self::Render(error) if error.is_input() => 2,
+            Self::Render(_) | Self::Output(_) | Self::Internal(_) => 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_input_is_2_and_everything_else_is_1() {
+        let layer = RenderError::UnknownLayer {
+            name: "x".to_owned(),
+        };
+        let write = RenderError::Write {
+            path: "x.exr".into(),
+            reason: "disk full".to_owned(),
+        };
+        assert_eq!(CliError::from(layer).status(), 2);
+        assert_eq!(CliError::from(write).status(), 1);
+        assert_eq!(CliError::Internal(String::new()).status(), 1);
+        assert_eq!(
+            CliError::UnknownKind {
+                path: "x".to_owned()
+            }
+            .status(),
+            2
+        );
+    }
+}

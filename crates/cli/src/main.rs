@@ -1,0 +1,30 @@
+//! The `tyndall` command: arguments in, progress and readable errors out.
+//!
+//! All rendering is in `tyndall-render`; this crate only talks to people.
+
+mod args;
+mod commands;
+mod error;
+mod failure;
+mod output;
+mod progress;
+mod value;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    failure::keep_panics_quiet();
+    let cli = match args::Cli::try_parse() {
+        Ok(cli) => cli,
+        // Prints help on standard output and ends with 0, or a usage error on standard error and ends with 2.
+        Err(message) => message.exit(),
+    };
+    match failure::catch(|| commands::run(&cli.command)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::say(&format!("error: {error}"));
+            ExitCode::from(error.status())
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! All media of a scene, and the questions transport asks of them.
+//!
+//! Media overlap freely and add up. Vacuum (no extinction, no emission) is kept in the list and costs nothing else.
+
+use crate::gradient::{self, EndGradients};
+use crate::line::Line;
+use crate::segment::Piece;
+use crate::{Medium, MediumPoint, Segment};
+use glam::Vec3;
+use tyndall_math::{Aabb, Ray};
+
+/// The media of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Media {
+    list: Vec<Medium>,
+}
+
+impl Media {
+    /// Overlapping media add up; their order does not matter.
+    pub fn new(list: Vec<Medium>) -> Self {
+        Self { list }
+    }
+
+    /// The media, as given.
+    pub fn list(&self) -> &[Medium] {
+        &self.list
+    }
+
+    /// Whether light passes as through empty space: no medium, or vacuum alone.
+    pub fn is_empty(&self) -> bool {
+        self.list.iter().all(Medium::is_vacuum)
+    }
+
+    /// The media at point `p`.
+    pub fn at(&self, p: Vec3) -> MediumPoint<'_> {
+        let mut point = MediumPoint::empty(p);
+        for medium in &self.list {
+            if !medium.is_vacuum() && medium.region().contains(p) {
+                point.add(medium);
+            }
+        }
+        point
+    }
+
+    /// The media along `ray` from 0 to `t_max`, which may be infinite.
+    pub fn segment(&self, ray: &Ray, t_max: f32) -> Segment<'_> {
+        Segment::new(&self.list, &ray.into(), t_max)
+    }
+
+    /// Optical depth along `ray` from 0 to `t_max`, which may be infinite, for each channel.
+    ///
+    /// τ = Σ σt ∫ ρ dt over the media, each in closed form. May be infinite, never NaN: a channel without
+    /// extinction is 0 over any distance. Transmittance is exp(−τ).
+    pub fn optical_depth(&self, ray: &Ray, t_max: f32) -> Vec3 {
+        let line = Line::from(ray);
+        self.list
+            .iter()
+            .filter_map(|medium| Piece::new(medium, &line, t_max.into()))
+            .map(|piece| piece.total())
+            .sum()
+    }
+
+    /// Optical depth between `a` and `b` with its gradients with respect to moving either point.
+    ///
+    /// Exact, with the motion of region boundaries along the segment; see [`EndGradients`]. Zero where the points coincide.
+    pub fn optical_depth_gradient(&self, a: Vec3, b: Vec3) -> EndGradients {
+        gradient::of_ends(&self.list, a.as_dvec3(), b.as_dvec3())
+    }
+
+    /// Optical depth along `ray` to `t_max`, which may be infinite, and its gradient for each channel when the origin moves
+    /// while direction and length stay.
+    ///
+    /// Where a medium's column is infinite (or above 10²⁰ m), its share of the gradient is zero: transmittance is and stays 0.
+    pub fn optical_depth_gradient_rigid(&self, ray: &Ray, t_max: f32) -> (Vec3, [Vec3; 3]) {
+        gradient::of_translation(&self.list, &ray.into(), t_max.into())
+    }
+
+    /// Whether all scattering is isotropic.
+    pub fn is_isotropic(&self) -> bool {
+        self.list
+            .iter()
+            .all(|m| m.is_vacuum() || m.sigma_s() == Vec3::ZERO || m.phase().is_isotropic())
+    }
+
+    /// Whether any medium emits light.
+    pub fn emits(&self) -> bool {
+        self.matter().any(|m| m.emission() != Vec3::ZERO)
+    }
+
+    /// Distance in metres from `p` to the nearest point where a medium begins or ends; infinite where none does.
+    pub fn distance_to_boundary(&self, p: Vec3) -> f32 {
+        self.matter()
+            .map(|m| m.region().distance_to_boundary(p))
+            .fold(f32::INFINITY, f32::min)
+    }
+
+    /// The smallest box around all media, [`Aabb::EMPTY`] where there are none; `None` where a medium has no bounds.
+    pub fn bounds(&self) -> Option<Aabb> {
+        self.matter()
+            .try_fold(Aabb::EMPTY, |all, m| Some(all.union(m.region().bounds()?)))
+    }
+
+    /// The media that light notices.
+    fn matter(&self) -> impl Iterator<Item = &Medium> {
+        self.list.iter().filter(|m| !m.is_vacuum())
+    }
+}

@@ -1,0 +1,239 @@
+//! All media at one point: coefficients, phase function, sampling.
+//!
+//! Overlapping media add: coefficients sum, phase functions mix in proportion to scattering, channel by channel.
+
+use crate::Medium;
+use glam::Vec3;
+use smallvec::SmallVec;
+
+/// The media at a point.
+#[derive(Clone, Debug)]
+pub struct MediumPoint<'a> {
+    /// Extinction, per metre.
+    pub sigma_t: Vec3,
+    /// Scattering, per metre.
+    pub sigma_s: Vec3,
+    /// Emitted radiance per metre, W/(m³ sr).
+    pub emission: Vec3,
+    position: Vec3,
+    lobes: SmallVec<[Lobe<'a>; 4]>,
+}
+
+/// One medium's share of the scattering.
+#[derive(Clone, Copy, Debug)]
+struct Lobe<'a> {
+    medium: &'a Medium,
+    density: f32,
+}
+
+impl Lobe<'_> {
+    /// Weight in the choice among media.
+    fn weight(&self) -> f32 {
+        self.density * self.medium.mean_sigma_s()
+    }
+}
+
+impl<'a> MediumPoint<'a> {
+    /// The point `position`, without media yet.
+    pub(crate) fn empty(position: Vec3) -> Self {
+        Self {
+            sigma_t: Vec3::ZERO,
+            sigma_s: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            position,
+            lobes: SmallVec::new(),
+        }
+    }
+
+    /// Adds a medium whose region holds the point.
+    pub(crate) fn add(&mut self, medium: &'a Medium) {
+        let density = medium.density().value(self.position);
+        self.sigma_t += medium.sigma_t() * density;
+        self.sigma_s += medium.sigma_s() * density;
+        self.emission += medium.emission() * density;
+        let lobe = Lobe { medium, density };
+        if lobe.weight() > 0.0 {
+            self.lobes.push(lobe);
+        }
+    }
+
+    /// `Σ σs p(w_o, w_i)` over the media, per metre and steradian: what turns radiance from `w_i` into radiance along `w_o`.
+    pub fn scattering(&self, w_o: Vec3, w_i: Vec3) -> Vec3 {
+        self.lobes
+            .iter()
+            .map(|lobe| lobe.medium.sigma_s() * (lobe.density * lobe.medium.phase().eval(w_o, w_i)))
+            .sum()
+    }
+
+    /// Density per steradian with which [`MediumPoint::sample_phase`] picks `w_i`; 0 where nothing scatters.
+    pub fn phase_pdf(&self, w_o: Vec3, w_i: Vec3) -> f32 {
+        if let [lobe] = self.lobes.as_slice() {
+            return lobe.medium.phase().pdf(w_o, w_i);
+        }
+        let (mut sum, mut total) = (0.0, 0.0);
+        for lobe in &self.lobes {
+            let weight = lobe.weight();
+            sum += weight * lobe.medium.phase().pdf(w_o, w_i);
+            total += weight;
+        }
+        if total > 0.0 { sum / total } else { 0.0 }
+    }
+
+    /// A direction drawn from the phase functions mixed by their mean scattering, and its density per steradian.
+    ///
+    /// `u` holds two numbers in [0, 1). Where nothing scatters the direction goes straight on, with density 0.
+    pub fn sample_phase(&self, w_o: Vec3, u: [f32; 2]) -> (Vec3, f32) {
+        if let [lobe] = self.lobes.as_slice() {
+            return lobe.medium.phase().sample(w_o, u);
+        }
+        let total: f32 = self.lobes.iter().map(Lobe::weight).sum();
+        // The first number chooses the medium; what is left of it is uniform again and chooses the angle.
+        let mut rest = u[0] * total;
+        let mut chosen = None;
+        for lobe in &self.lobes {
+            let weight = lobe.weight();
+            chosen = Some((lobe, (rest / weight).min(BELOW_ONE)));
+            if rest < weight {
+                break;
+            }
+            rest -= weight;
+        }
+        let Some((lobe, u0)) = chosen else {
+            return (-w_o, 0.0);
+        };
+        let (w_i, _) = lobe.medium.phase().sample(w_o, [u0, u[1]]);
+        (w_i, self.phase_pdf(w_o, w_i))
+    }
+
+    /// ∇σs/σs, per metre, for each colour channel; zero where a channel does not scatter.
+    ///
+    /// The density's own gradient: the step at a region's boundary is not in it.
+    pub fn grad_ln_sigma_s(&self) -> [Vec3; 3] {
+        let mut gradient = [Vec3::ZERO; 3];
+        for lobe in &self.lobes {
+            let grad_density = lobe.medium.density().gradient(self.position);
+            for (channel, sum) in gradient.iter_mut().enumerate() {
+                *sum += lobe.medium.sigma_s()[channel] * grad_density;
+            }
+        }
+        for (channel, sum) in gradient.iter_mut().enumerate() {
+            let sigma_s = self.sigma_s[channel];
+            *sum = if sigma_s > 0.0 {
+                *sum / sigma_s
+            } else {
+                Vec3::ZERO
+            };
+        }
+        gradient
+    }
+}
+
+/// The largest f32 below 1.
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+    use crate::{Density, Media, Medium, MediumParams, PhaseFunction, Region};
+    use glam::Vec3;
+    use tyndall_math::testing::{Directions, assert_conforms};
+
+    /// Coloured forward haze everywhere, isotropic height fog, backward dust in a ball around the origin.
+    fn media() -> Media {
+        let haze = MediumParams {
+            phase: PhaseFunction::henyey_greenstein(0.6).unwrap(),
+            emission: Vec3::X,
+            ..MediumParams::new(Vec3::new(0.3, 0.2, 0.1), Vec3::new(1.0, 0.5, 0.0))
+        };
+        let fog = MediumParams {
+            density: Density::Height {
+                base: -2.0,
+                scale_height: 3.0,
+            },
+            ..MediumParams::new(Vec3::splat(0.4), Vec3::splat(0.9))
+        };
+        let dust = MediumParams {
+            phase: PhaseFunction::henyey_greenstein(-0.3).unwrap(),
+            region: Region::Sphere {
+                center: Vec3::ZERO,
+                radius: 1.0,
+            },
+            ..MediumParams::new(Vec3::splat(2.0), Vec3::splat(0.1))
+        };
+        Media::new([haze, fog, dust].map(|p| Medium::new(p).unwrap()).into())
+    }
+
+    const INSIDE: Vec3 = Vec3::new(0.2, 0.4, 0.1);
+    const ABOVE: Vec3 = Vec3::new(0.0, 2.0, 0.0);
+
+    #[test]
+    fn coefficients_of_overlapping_media_add() {
+        let media = media();
+        let fog = (-2.4_f32 / 3.0).exp();
+        let point = media.at(INSIDE);
+        let near = |a: Vec3, b: Vec3| a.abs_diff_eq(b, 1e-6);
+        assert!(near(point.sigma_t, Vec3::new(2.3, 2.2, 2.1) + 0.4 * fog));
+        assert!(near(point.sigma_s, Vec3::new(0.5, 0.3, 0.2) + 0.36 * fog));
+        assert_eq!(point.emission, Vec3::X);
+        let (w_o, w_i) = (Vec3::X, Vec3::new(0.0, 0.6, -0.8));
+        let lobe = |g: f32| PhaseFunction::henyey_greenstein(g).unwrap().eval(w_o, w_i);
+        let expected =
+            Vec3::new(0.3, 0.1, 0.0) * lobe(0.6) + 0.36 * fog * lobe(0.0) + 0.2 * lobe(-0.3);
+        assert!(near(point.scattering(w_o, w_i), expected));
+    }
+
+    #[test]
+    fn mixed_phase_functions_are_sampled_as_stated() {
+        let media = media();
+        for p in [INSIDE, ABOVE, Vec3::new(0.0, 40.0, 0.0)] {
+            let point = media.at(p);
+            let w_o = Vec3::new(0.6, 0.0, 0.8);
+            assert_conforms(
+                &Directions::sphere(),
+                7,
+                |u| Some(point.sample_phase(w_o, u)),
+                |w_i| point.phase_pdf(w_o, w_i),
+            );
+        }
+    }
+
+    #[test]
+    fn every_random_number_chooses_a_direction() {
+        let media = media();
+        let point = media.at(INSIDE);
+        for u in [0.0, 0.25, 0.5, 0.75, 1.0 - f32::EPSILON / 2.0] {
+            let (w_i, pdf) = point.sample_phase(Vec3::Y, [u, 0.5]);
+            assert!(w_i.is_normalized() && pdf > 0.0);
+        }
+    }
+
+    #[test]
+    fn where_nothing_scatters_nothing_is_sampled() {
+        let soot = MediumParams::new(Vec3::ONE, Vec3::ZERO);
+        for media in [
+            Media::default(),
+            Media::new(vec![Medium::new(soot).unwrap()]),
+        ] {
+            let point = media.at(Vec3::ZERO);
+            assert_eq!(point.sample_phase(Vec3::Z, [0.3, 0.6]), (Vec3::NEG_Z, 0.0));
+            assert_eq!(point.phase_pdf(Vec3::Z, Vec3::X), 0.0);
+            assert_eq!(point.scattering(Vec3::Z, Vec3::X), Vec3::ZERO);
+            assert_eq!(point.grad_ln_sigma_s(), [Vec3::ZERO; 3]);
+        }
+    }
+
+    #[test]
+    fn the_logarithmic_gradient_of_scattering_is_its_slope() {
+        let media = media();
+        let h = 1e-2;
+        for p in [ABOVE, Vec3::new(3.0, -1.0, 0.0), Vec3::new(3.0, -3.0, 0.0)] {
+            let [up, down] = [h, -h].map(|h| media.at(p + h * Vec3::Y).sigma_s);
+            let slope = (up - down) / (2.0 * h * media.at(p).sigma_s);
+            let gradient = media.at(p).grad_ln_sigma_s();
+            for channel in 0..3 {
+                // f32 rounding over the step; the error of the difference, h²/54, is smaller.
+                assert!((gradient[channel] - slope[channel] * Vec3::Y).length() < 3e-5);
+            }
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! What can go wrong between a scene and an image file.
+//!
+//! [`RenderError::is_input`] tells mistakes in the command or its files from failures of the machine, which is what exit statuses need.
+
+use crate::layers::known_layers;
+use std::path::PathBuf;
+
+/// Errors of this crate; the text says what, where, what is allowed and what would mend it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// A value of [`RenderOptions`](crate::options::RenderOptions) lies outside its range.
+    #[error("{option} is {found}, but it must be {allowed}")]
+    Option {
+        /// The option as the command line spells it.
+        option: &'static str,
+        /// What was given.
+        found: String,
+        /// What may be given.
+        allowed: String,
+    },
+    /// A part of the contract that this version does not hold yet.
+    #[error("{what} is not built yet in this version; {instead}")]
+    NotBuilt {
+        /// What was asked for.
+        what: String,
+        /// What can be done meanwhile.
+        instead: String,
+    },
+    /// A layer name that is not in the table of layers.
+    #[error("there is no image layer `{name}`; the layers are {}", known_layers())]
+    UnknownLayer {
+        /// The name given.
+        name: String,
+    },
+    /// The threads could not be started.
+    #[error("cannot start {threads} threads: {reason}; try fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+    /// An output name whose ending names no image format.
+    #[error("cannot tell the image format of an output file: its name must end in .exr or .png: {}", path.display())]
+    OutputEnding {
+        /// The output file.
+        path: PathBuf,
+    },
+    /// A place that cannot be written to, found before the render starts.
+    #[error("cannot write the output there ({source}); choose a folder that exists and may be written to: {}", path.display())]
+    OutputPlace {
+        /// The output file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Writing a file failed.
+    #[error("writing failed ({reason}); any file that stood there before is untouched: {}", path.display())]
+    Write {
+        /// The output file.
+        path: PathBuf,
+        /// What went wrong.
+        reason: String,
+    },
+    /// A value that no image may hold.
+    #[error(
+        "the image holds {value} in channel `{channel}` at pixel ({x}, {y}) and was not written: this is a bug of the renderer, please report it with the scene"
+    )]
+    NotFinite {
+        /// The channel's name in the file.
+        channel: String,
+        /// Column, counted from the left of the full frame.
+        x: usize,
+        /// Row, counted from the top of the full frame.
+        y: usize,
+        /// The value found.
+        value: f32,
+    },
+    /// A file that could not be read as an image.
+    #[error("cannot read an image ({reason}): {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong.
+        reason: String,
+    },
+    /// An image without the layer that a comparison asks for.
+    #[error("image {image} has no layer `{layer}`; its channels are {found}")]
+    MissingLayer {
+        /// Which image: A, B or B2.
+        image: &'static str,
+        /// The layer asked for.
+        layer: String,
+        /// The channels it has.
+        found: String,
+    },
+    /// Images that cannot be compared pixel by pixel.
+    #[error("image A has {} × {} pixels with {} channels and image {image} has {} × {} with {}; only images of one size can be compared", a[0], a[1], a[2], b[0], b[1], b[2])]
+    Size {
+        /// Which image differs from A: B or B2.
+        image: &'static str,
+        /// Width, height and number of channels of A.
+        a: [usize; 3],
+        /// Width, height and number of channels of the other.
+        b: [usize; 3],
+    },
+}
+
+impl RenderError {
+    /// Whether the command or an input file is at fault, and not the machine or the renderer.
+    pub fn is_input(&self) -> bool {
+        !matches!(
+            self,
+            Self::Threads { .. } | Self::Write { .. } | Self::NotFinite { .. }
+        )
+    }
+}

@@ -1,0 +1,358 @@
+//! What a scene or an image holds, as numbers for `tyndall info`.
+//!
+//! Plain data with units in the field names; the command line prints or serialises it.
+
+use crate::image::Image;
+use glam::Vec3;
+use serde::Serialize;
+use tyndall_media::{Density, Medium, PhaseFunction, Region};
+use tyndall_scene::Scene;
+use tyndall_scene::lights::{FlatEmitter, Light};
+
+/// What a scene holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneInfo {
+    /// Width and height of the image in pixels.
+    pub film: [u32; 2],
+    /// Where the camera stands, m.
+    pub eye: [f32; 3],
+    /// Unit direction in which it looks.
+    pub forward: [f32; 3],
+    /// Its vertical field of view, degrees.
+    pub vfov_degrees: f32,
+    /// Smallest and largest coordinates of surfaces and bounded media, m; null where there are none.
+    pub bounds_m: Option<[[f32; 3]; 2]>,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Number of materials.
+    pub materials: usize,
+    /// Number of textures.
+    pub textures: usize,
+    /// The lights, emissive surfaces among them.
+    pub lights: Vec<LightInfo>,
+    /// The media.
+    pub media: Vec<MediumInfo>,
+    /// Memory of meshes, MiB.
+    pub mesh_mib: f64,
+    /// Memory of textures, MiB.
+    pub texture_mib: f64,
+    /// Memory of the search tree over the triangles, MiB.
+    pub search_tree_mib: f64,
+    /// What was repaired, ignored or will look odd.
+    pub warnings: Vec<String>,
+}
+
+/// One light; a field that has no meaning for its kind is left out of the JSON.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct LightInfo {
+    /// Its kind, in the words of the scene file.
+    pub kind: &'static str,
+    /// Where it is, m; the centre of an emissive surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f32; 3]>,
+    /// Radiant power, W per channel; light from infinitely far away counts what enters the sphere around the scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub power_w: Option<[f32; 3]>,
+    /// Radiant intensity in its strongest direction, W/sr per channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intensity_w_sr: Option<[f32; 3]>,
+    /// Irradiance perpendicular to its direction, W/m² per channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub irradiance_w_m2: Option<[f32; 3]>,
+    /// Mean radiance, W/(m² sr) per channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radiance_w_m2_sr: Option<[f32; 3]>,
+    /// Area of one side, m².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub area_m2: Option<f32>,
+}
+
+/// One medium.
+#[derive(Clone, Debug, Serialize)]
+pub struct MediumInfo {
+    /// Its name.
+    pub name: String,
+    /// Where it is, as the scene file writes it.
+    pub region: String,
+    /// How its density varies, as the scene file writes it.
+    pub density: String,
+    /// Its phase function, as the scene file writes it.
+    pub phase: String,
+    /// Extinction at density 1, 1/m per channel.
+    pub sigma_t_per_m: [f32; 3],
+    /// Scattering at density 1, 1/m per channel.
+    pub sigma_s_per_m: [f32; 3],
+    /// Single-scattering albedo per channel.
+    pub albedo: [f32; 3],
+    /// Mean distance between collisions where the medium is densest, m per channel; null where there are none.
+    pub mean_free_path_m: [Option<f32>; 3],
+    /// Emission at density 1, W/(m³ sr) per channel.
+    pub emission_w_m3_sr: [f32; 3],
+}
+
+impl SceneInfo {
+    /// Describes `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        let surfaces = scene.geometry.surfaces();
+        let mesh = &surfaces.mesh;
+        let mesh_bytes = size_of_val(mesh.positions.as_slice())
+            + size_of_val(mesh.normals.as_slice())
+            + mesh
+                .uvs
+                .iter()
+                .map(|set| size_of_val(set.as_slice()))
+                .sum::<usize>()
+            + size_of_val(mesh.colors.as_slice())
+            + size_of_val(mesh.indices.as_slice())
+            + size_of_val(mesh.materials.as_slice());
+        let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+        let bounds = (!scene.bounds.is_empty()).then_some(scene.bounds);
+        let radius = bounds.map(|b| 0.5 * b.diagonal());
+        Self {
+            film: [scene.film.width, scene.film.height],
+            eye: scene.camera.eye().to_array(),
+            forward: scene.camera.forward().to_array(),
+            vfov_degrees: scene.camera.yfov().to_degrees(),
+            bounds_m: bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
+            triangles: scene.geometry.len(),
+            materials: surfaces.materials.len(),
+            textures: surfaces.textures.len(),
+            lights: scene
+                .lights
+                .list()
+                .iter()
+                .map(|light| LightInfo::of(light, radius))
+                .collect(),
+            media: scene.media.list().iter().map(MediumInfo::of).collect(),
+            mesh_mib: mib(mesh_bytes),
+            texture_mib: mib(surfaces.textures.iter().map(|t| t.bytes()).sum()),
+            search_tree_mib: mib(scene.geometry.bytes()),
+            warnings: scene.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+impl LightInfo {
+    /// Describes `light` in a scene whose bounding sphere has `radius` metres.
+    fn of(light: &Light, radius: Option<f32>) -> Self {
+        let array = |v: Vec3| Some(v.to_array());
+        let far = |info: Self| Self {
+            power_w: radius.map(|r| light.power(r).to_array()),
+            ..info
+        };
+        let kind = light.kind();
+        match light {
+            Light::Point(l) => Self {
+                kind,
+                position_m: array(l.position()),
+                power_w: array(l.power()),
+                intensity_w_sr: array(l.intensity()),
+                ..Self::default()
+            },
+            Light::Spot(l) => Self {
+                kind,
+                position_m: array(l.position()),
+                power_w: array(l.power()),
+                intensity_w_sr: array(l.intensity()),
+                ..Self::default()
+            },
+            Light::Triangle(l) => Self::of_surface(kind, l.flat()),
+            Light::Quad(l) => Self::of_surface(kind, l.flat()),
+            Light::Directional(l) => far(Self {
+                kind,
+                irradiance_w_m2: array(l.irradiance()),
+                ..Self::default()
+            }),
+            Light::Sky(l) => far(Self {
+                kind,
+                radiance_w_m2_sr: array(l.radiance()),
+                ..Self::default()
+            }),
+            Light::Environment(l) => {
+                let mean = l.fluence() / (4.0 * std::f32::consts::PI);
+                far(Self {
+                    kind,
+                    radiance_w_m2_sr: array(mean),
+                    ..Self::default()
+                })
+            }
+        }
+    }
+
+    fn of_surface(kind: &'static str, flat: &FlatEmitter) -> Self {
+        let radiance = flat.emission().mean();
+        Self {
+            kind,
+            position_m: Some(flat.center().to_array()),
+            power_w: Some(flat.power().to_array()),
+            intensity_w_sr: Some((radiance * flat.area()).to_array()),
+            radiance_w_m2_sr: Some(radiance.to_array()),
+            area_m2: Some(flat.area()),
+            ..Self::default()
+        }
+    }
+}
+
+impl MediumInfo {
+    fn of(medium: &Medium) -> Self {
+        let densest = match medium.density() {
+            Density::Constant(density) => *density,
+            Density::Height { .. } => 1.0,
+        };
+        let free_path =
+            |sigma_t: f32| Some(1.0 / (sigma_t * densest)).filter(|path| path.is_finite());
+        Self {
+            name: medium.name().to_owned(),
+            region: match medium.region() {
+                Region::Everywhere => "Everywhere".to_owned(),
+                Region::Box { min, max } => {
+                    format!("Box(min: {}, max: {})", tuple(*min), tuple(*max))
+                }
+                Region::Sphere { center, radius } => {
+                    format!("Sphere(center: {}, radius: {radius:?})", tuple(*center))
+                }
+            },
+            density: match medium.density() {
+                Density::Constant(density) => format!("Constant({density:?})"),
+                Density::Height { base, scale_height } => {
+                    format!("Height(base: {base:?}, scale_height: {scale_height:?})")
+                }
+            },
+            phase: match medium.phase() {
+                PhaseFunction::Isotropic => "Isotropic".to_owned(),
+                PhaseFunction::HenyeyGreenstein(_) => {
+                    format!("HenyeyGreenstein(g: {:?})", medium.phase().mean_cosine())
+                }
+            },
+            sigma_t_per_m: medium.sigma_t().to_array(),
+            sigma_s_per_m: medium.sigma_s().to_array(),
+            albedo: medium.albedo().to_array(),
+            mean_free_path_m: medium.sigma_t().to_array().map(free_path),
+            emission_w_m3_sr: medium.emission().to_array(),
+        }
+    }
+}
+
+/// A vector as the scene file writes it.
+fn tuple(v: Vec3) -> String {
+    format!("({:?}, {:?}, {:?})", v.x, v.y, v.z)
+}
+
+/// What an image holds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImageInfo {
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// Column and row of the frame at which it starts.
+    pub origin: [usize; 2],
+    /// Width and height of the frame of which it is a part.
+    pub frame: [usize; 2],
+    /// Its channels.
+    pub channels: Vec<ChannelInfo>,
+}
+
+/// One channel of an image; smallest, largest and mean are of its finite values, null where it has none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelInfo {
+    /// Its name in the file.
+    pub name: String,
+    /// Smallest value.
+    pub min: Option<f32>,
+    /// Mean value.
+    pub mean: Option<f64>,
+    /// Largest value.
+    pub max: Option<f32>,
+    /// Number of values that are NaN.
+    pub nan: usize,
+    /// Number of values that are infinite.
+    pub inf: usize,
+}
+
+impl ImageInfo {
+    /// Describes `image`.
+    pub fn of(image: &Image) -> Self {
+        Self {
+            size: [image.width, image.height],
+            origin: image.origin,
+            frame: image.frame,
+            channels: image
+                .channels
+                .iter()
+                .map(|(name, values)| ChannelInfo::of(name, values))
+                .collect(),
+        }
+    }
+}
+
+impl ChannelInfo {
+    fn of(name: &str, values: &[f32]) -> Self {
+        let finite = || values.iter().copied().filter(|v| v.is_finite());
+        let n = finite().count();
+        let sum: f64 = finite().map(f64::from).sum();
+        Self {
+            name: name.to_owned(),
+            min: finite().reduce(f32::min),
+            mean: (n > 0).then(|| sum / n as f64),
+            max: finite().reduce(f32::max),
+            nan: values.iter().filter(|v| v.is_nan()).count(),
+            inf: values.iter().filter(|v| v.is_infinite()).count(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+    use super::*;
+    use std::path::Path;
+    use tyndall_scene::{LoadOptions, load_str};
+
+    #[test]
+    fn a_scene_tells_its_lights_in_watts_and_its_media_in_metres() {
+        let ron = "Scene(
+            camera: LookAt(eye: (0.0, 0.0, 5.0), target: (0.0, 0.0, 0.0), vfov: 40.0),
+            lights: [Point(position: (0.0, 1.0, 0.0), intensity: (1.0, 2.0, 3.0)), Sky(radiance: (0.5, 0.5, 0.5))],
+            media: [Medium(region: Sphere(center: (0.0, 0.0, 0.0), radius: 2.0), density: Constant(2.0),
+                sigma_t: (0.25, 0.0, 1.0), albedo: (0.5, 0.5, 0.5), phase: HenyeyGreenstein(g: 0.5))],
+        )";
+        let info = SceneInfo::of(&load_str(ron, Path::new("."), &LoadOptions::default()).unwrap());
+        assert_eq!(info.film, [1024, 768]);
+        assert!((info.vfov_degrees - 40.0).abs() < 1e-4);
+        assert_eq!((info.triangles, info.textures), (0, 0));
+        let [point, sky] = info.lights.as_slice() else {
+            panic!("{:?}", info.lights)
+        };
+        assert_eq!(
+            (point.kind, point.intensity_w_sr),
+            ("point", Some([1.0, 2.0, 3.0]))
+        );
+        let power = point.power_w.unwrap();
+        assert!(
+            (power[1] / (8.0 * std::f32::consts::PI) - 1.0).abs() < 1e-6,
+            "4π I: {power:?}"
+        );
+        assert_eq!((sky.kind, sky.radiance_w_m2_sr), ("sky", Some([0.5; 3])));
+        let fog = &info.media[0];
+        assert_eq!(fog.mean_free_path_m, [Some(2.0), None, Some(0.5)]);
+        assert_eq!(
+            (fog.phase.as_str(), fog.density.as_str()),
+            ("HenyeyGreenstein(g: 0.5)", "Constant(2.0)")
+        );
+        assert_eq!(fog.region, "Sphere(center: (0.0, 0.0, 0.0), radius: 2.0)");
+    }
+
+    #[test]
+    fn a_channel_tells_its_range_and_what_is_not_finite() {
+        let info = ChannelInfo::of("R", &[1.0, f32::NAN, 3.0, f32::INFINITY]);
+        let expected = ChannelInfo {
+            name: "R".to_owned(),
+            min: Some(1.0),
+            mean: Some(2.0),
+            max: Some(3.0),
+            nan: 1,
+            inf: 1,
+        };
+        assert_eq!(info, expected);
+        assert_eq!(ChannelInfo::of("G", &[]).mean, None);
+    }
+}

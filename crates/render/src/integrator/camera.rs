@@ -1,0 +1,235 @@
+//! One camera sample: the layers of a pixel along one ray, by path tracing or from cache records.
+//!
+//! The cached way computes single scattering straight from the lights, reads multiple scattering from records and traces
+//! surfaces; each scene pays only for what it holds.
+
+use super::counted::Counted;
+use crate::film::Pixel;
+use glam::Vec3;
+use std::cell::Cell;
+use tyndall_cache::Cache;
+use tyndall_math::{Ray, Sampler};
+use tyndall_scene::{LightSet, Scene};
+use tyndall_transport::emission;
+use tyndall_transport::free_flight::FreeFlight;
+use tyndall_transport::layers::LayerVisitor;
+use tyndall_transport::path::{FirstEvent, Start, trace};
+use tyndall_transport::single::SegmentLight;
+use tyndall_transport::world::{Geometry, SurfaceHit, World};
+
+/// Single-scattering samples along each camera ray of the cached integrator.
+const SINGLE_SAMPLES: u32 = 2;
+/// Lookups of multiple scattering along each camera ray.
+const MULTIPLE_SAMPLES: u32 = 2;
+/// First set of sample dimensions used beside the path along the camera ray; the path's own lie below and are spent by
+/// its first vertices.
+const CAMERA_SETS: u32 = 16;
+
+/// How multiple scattering is found along camera rays.
+pub(crate) enum Multiple<'c> {
+    /// There is none.
+    None,
+    /// Interpolated from records.
+    Records(&'c Cache<3>),
+    /// Path traced.
+    Paths,
+}
+
+/// Computes camera samples of one scene; one for each row of the image.
+pub(crate) struct Camera<'s> {
+    scene: &'s Scene,
+    frame: [u32; 2],
+    max_depth: Option<u32>,
+    geometry: Counted<'s>,
+    lookups: Cell<u64>,
+    missed: Cell<u64>,
+}
+
+/// What camera samples cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) rays: u64,
+    pub(crate) lookups: u64,
+    pub(crate) missed: u64,
+}
+
+impl Tally {
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.rays += other.rays;
+        self.lookups += other.lookups;
+        self.missed += other.missed;
+    }
+}
+
+impl<'s> Camera<'s> {
+    pub(crate) fn new(scene: &'s Scene, frame: [u32; 2], max_depth: Option<u32>) -> Self {
+        Self {
+            scene,
+            frame,
+            max_depth,
+            geometry: Counted::new(scene),
+            lookups: Cell::new(0),
+            missed: Cell::new(0),
+        }
+    }
+
+    pub(crate) fn tally(&self) -> Tally {
+        Tally {
+            rays: self.geometry.rays(),
+            lookups: self.lookups.get(),
+            missed: self.missed.get(),
+        }
+    }
+
+    /// The camera ray of a sample in pixel (x, y), box filtered over the pixel.
+    fn ray(&self, x: u32, y: u32, sampler: &mut Sampler) -> Ray {
+        let [u, v] = sampler.next_2d();
+        let [w, h] = self.frame;
+        self.scene.camera.ray(x as f32 + u, y as f32 + v, w, h)
+    }
+
+    fn may_scatter(&self, events: u32) -> bool {
+        self.max_depth.is_none_or(|max| events <= max)
+    }
+
+    /// A path-traced sample of pixel (x, y).
+    pub(crate) fn path_traced(&self, x: u32, y: u32, sampler: &mut Sampler) -> Pixel {
+        let world = self.geometry.world(self.scene);
+        let ray = self.ray(x, y, sampler);
+        let hit = world.geometry.intersect(&ray, f32::INFINITY);
+        let start = Start {
+            ray,
+            hit: Some(hit),
+            first: FirstEvent::Any,
+            max_depth: self.max_depth,
+        };
+        let mut visitor = LayerVisitor::default();
+        trace(&world, &start, sampler, &mut visitor);
+        let layers = visitor.layers;
+        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
+        let tau = world.media.optical_depth(&ray, t_max);
+        Pixel {
+            surface: layers.surface,
+            single: layers.single,
+            multiple: layers.multiple,
+            emission: layers.emission,
+            transmittance: tau.map(|tau| (-tau).exp()),
+            depth: hit.map_or(0.0, |h| h.t),
+            records: 0.0,
+        }
+    }
+
+    /// A sample of pixel (x, y) with multiple scattering found as `multiple` says.
+    pub(crate) fn cached(&self, x: u32, y: u32, sampler: &mut Sampler, multiple: &Multiple<'_>) -> Pixel {
+        let world = self.geometry.world(self.scene);
+        let ray = self.ray(x, y, sampler);
+        let hit = world.geometry.intersect(&ray, f32::INFINITY);
+        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
+        let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+        let mut pixel = Pixel {
+            surface: self.traced(&ray, hit, FirstEvent::Surface, sampler).surface,
+            transmittance: flight.transmittance(),
+            depth: hit.map_or(0.0, |h| h.t),
+            ..Pixel::default()
+        };
+        if flight.segment().is_empty() {
+            return pixel;
+        }
+        sampler.start_set(CAMERA_SETS);
+        if let Some(e) = emission::sample(&world, &ray, &flight, sampler.next_1d()) {
+            pixel.emission = e.value;
+        }
+        if !flight.can_stop() {
+            return pixel;
+        }
+        if self.may_scatter(1) {
+            pixel.single = self.single(&world, &ray, &flight, sampler);
+        }
+        if self.may_scatter(2) {
+            match multiple {
+                Multiple::None => {}
+                Multiple::Records(cache) => {
+                    let (value, records) = self.from_records(&ray, &flight, cache, sampler);
+                    pixel.multiple = value;
+                    pixel.records = records;
+                }
+                Multiple::Paths => {
+                    pixel.multiple = self.traced(&ray, hit, FirstEvent::Medium, sampler).multiple;
+                }
+            }
+        }
+        pixel
+    }
+
+    fn traced(
+        &self,
+        ray: &Ray,
+        hit: Option<SurfaceHit>,
+        first: FirstEvent,
+        sampler: &mut Sampler,
+    ) -> tyndall_transport::layers::Layers {
+        let start = Start {
+            ray: *ray,
+            hit: Some(hit),
+            first,
+            max_depth: self.max_depth,
+        };
+        let mut visitor = LayerVisitor::default();
+        trace(&self.geometry.world(self.scene), &start, sampler, &mut visitor);
+        visitor.layers
+    }
+
+    fn single<'w>(
+        &self,
+        world: &World<'w, Counted<'_>, LightSet>,
+        ray: &Ray,
+        flight: &FreeFlight<'w>,
+        sampler: &mut Sampler,
+    ) -> Vec3 {
+        let Some(lights) = SegmentLight::new(world, ray, flight) else {
+            return Vec3::ZERO;
+        };
+        let mut sum = Vec3::ZERO;
+        for i in 0..SINGLE_SAMPLES {
+            let [u, v] = sampler.next_2d();
+            let w = sampler.next_2d();
+            // The pixel's samples stratify u, v, w; along one ray the distances are stratified too.
+            let v = (v + i as f32 / SINGLE_SAMPLES as f32).fract();
+            if let Some(s) = lights.sample(world, u, v, w) {
+                sum += s.value;
+            }
+        }
+        sum / SINGLE_SAMPLES as f32
+    }
+
+    fn from_records(
+        &self,
+        ray: &Ray,
+        flight: &FreeFlight<'_>,
+        cache: &Cache<3>,
+        sampler: &mut Sampler,
+    ) -> (Vec3, f32) {
+        let media = &self.scene.media;
+        let offset = sampler.next_1d();
+        let mut sum = Vec3::ZERO;
+        let (mut looked, mut missed) = (0, 0);
+        for i in 0..MULTIPLE_SAMPLES {
+            let Some(t) = flight.sample_inside((i as f32 + offset) / MULTIPLE_SAMPLES as f32) else {
+                continue;
+            };
+            let x = ray.at(t);
+            looked += 1;
+            let radiance = cache.lookup(x).or_else(|| {
+                missed += 1;
+                cache.lookup_extended(x)
+            });
+            if let Some(radiance) = radiance {
+                sum += flight.transmittance_to(t) * media.at(x).sigma_s * Vec3::from(radiance)
+                    / flight.pdf_inside(t);
+            }
+        }
+        self.lookups.set(self.lookups.get() + looked);
+        self.missed.set(self.missed.get() + missed);
+        (sum / MULTIPLE_SAMPLES as f32, looked as f32)
+    }
+}

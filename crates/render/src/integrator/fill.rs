@@ -1,0 +1,242 @@
+//! Fills the cache of multiple scattering before the image is made.
+//!
+//! Camera rays on a lattice that grows finer report points no record covers; these are thinned in a fixed order, computed
+//! in parallel and inserted together, so that the records do not depend on the number of threads.
+
+use super::counted::Counted;
+use crate::options::{Phase, Progress};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+use tyndall_cache::{Cache, Record};
+use tyndall_math::{Key, Purpose, Ray, Sampler};
+use tyndall_scene::Scene;
+use tyndall_transport::free_flight::FreeFlight;
+use tyndall_transport::gather;
+use tyndall_transport::world::{Geometry, Lights};
+
+/// Pixels between the camera rays of each level, coarse to fine.
+const LEVELS: [u32; 4] = [32, 16, 8, 4];
+/// Points on each camera ray, evenly spread in transmittance.
+const POINTS_PER_RAY: u32 = 8;
+/// Rounds on one level: radii shrink when records come in, and open gaps that the next round closes.
+const ROUNDS: usize = 4;
+/// Accepted points of one round keep this share of a predicted radius between them.
+const SPACING: f32 = 0.7;
+/// Neighbouring radii may differ by this much per metre between them.
+const RADIUS_SLOPE: f32 = 1.0;
+/// Smallest and largest radius as shares of the length over which the view looks into the fog.
+const RADIUS_RANGE: [f32; 2] = [0.01, 0.25];
+/// A record may reach past the nearest surface by this factor.
+const PAST_SURFACE: f32 = 1.5;
+
+/// What the fill has to achieve.
+pub(crate) struct Fill<'s> {
+    pub(crate) scene: &'s Scene,
+    pub(crate) frame: [u32; 2],
+    pub(crate) max_depth: Option<u32>,
+    pub(crate) seed: u64,
+    /// Target error of the image.
+    pub(crate) error: f32,
+    /// When to stop with what there is.
+    pub(crate) deadline: Option<Instant>,
+}
+
+/// A point on a camera ray that asks for a record.
+#[derive(Clone, Copy)]
+struct Candidate {
+    position: Vec3,
+    /// Size of a pixel there, in metres.
+    footprint: f32,
+}
+
+impl Fill<'_> {
+    /// Computes the records the camera needs.
+    pub(crate) fn run(&self, progress: &dyn Progress) -> (Cache<3>, u64) {
+        let mut cache = Cache::new();
+        let mut rays = 0;
+        let scale = self.view_scale();
+        for (level, &stride) in LEVELS.iter().enumerate() {
+            for round in 0..ROUNDS {
+                let fraction = (level as f32 + round as f32 / ROUNDS as f32) / LEVELS.len() as f32;
+                progress.update(Phase::Fill, fraction, cache.len());
+                let missing = self.uncovered(&cache, level as u64, stride);
+                let points = thin(&missing, &cache, scale);
+                if points.is_empty() || self.out_of_time() {
+                    break;
+                }
+                let first = cache.len();
+                let done = AtomicUsize::new(0);
+                let computed: Vec<(Option<Record<3>>, u64)> = points
+                    .par_iter()
+                    .enumerate()
+                    .map(|(i, point)| {
+                        let geometry = Counted::new(self.scene);
+                        let record = self.record(&geometry, point, (first + i) as u64, scale);
+                        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+                        progress.update(Phase::Fill, fraction, first + n);
+                        (record, geometry.rays())
+                    })
+                    .collect();
+                rays += computed.iter().map(|(_, n)| n).sum::<u64>();
+                let records = computed.into_iter().filter_map(|(record, _)| record).collect();
+                if cache.insert(records).is_err() {
+                    debug_assert!(false, "a computed record is not valid");
+                    break;
+                }
+                cache.clamp_radii(RADIUS_SLOPE);
+            }
+        }
+        (cache, rays)
+    }
+
+    fn out_of_time(&self) -> bool {
+        self.deadline.is_some_and(|d| Instant::now() >= d)
+    }
+
+    /// Directions gathered for a record: noise falls with the error asked for, and about eight records blend at a point.
+    fn rays_per_record(&self) -> usize {
+        ((0.6 / self.error).powi(2) as usize).clamp(128, 4096)
+    }
+
+    /// Mean length over which camera rays see into the media, in metres.
+    fn view_scale(&self) -> f32 {
+        let [w, h] = self.frame;
+        let world = self.scene.world();
+        let (mut sum, mut n) = (0.0, 0.0);
+        for j in 0..8 {
+            for i in 0..8 {
+                let (x, y) = ((i as f32 + 0.5) / 8.0, (j as f32 + 0.5) / 8.0);
+                let ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
+                let t_max = world.geometry.intersect(&ray, f32::INFINITY).map_or(f32::INFINITY, |h| h.t);
+                let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+                if flight.can_stop() {
+                    let start = flight.segment().range().0;
+                    if let Some(t) = flight.sample_inside(0.9) {
+                        sum += t - start;
+                        n += 1.0;
+                    }
+                }
+            }
+        }
+        if n > 0.0 { sum / n } else { 1.0 }
+    }
+
+    /// Points on the camera rays of one level that no record covers, in a fixed order.
+    fn uncovered(&self, cache: &Cache<3>, level: u64, stride: u32) -> Vec<Candidate> {
+        let [w, h] = self.frame;
+        let rows: Vec<u32> = (0..h).step_by(stride as usize).collect();
+        let found: Vec<Vec<Candidate>> = rows
+            .par_iter()
+            .map(|&y| {
+                let mut row = Vec::new();
+                for x in (0..w).step_by(stride as usize) {
+                    let index = level << 40 | u64::from(y) * u64::from(w) + u64::from(x);
+                    let key = Key {
+                        seed: self.seed,
+                        purpose: Purpose::Placement,
+                        index,
+                    };
+                    let mut sampler = Sampler::new(key, 0);
+                    let [u, v] = sampler.next_2d();
+                    let ray = self.scene.camera.ray(
+                        (x as f32 + u * stride as f32).min(w as f32),
+                        (y as f32 + v * stride as f32).min(h as f32),
+                        w,
+                        h,
+                    );
+                    self.points_on(&ray, sampler.next_1d(), |candidate| {
+                        if !cache.covers(candidate.position) {
+                            row.push(candidate);
+                        }
+                    });
+                }
+                row
+            })
+            .collect();
+        found.into_iter().flatten().collect()
+    }
+
+    fn points_on(&self, ray: &Ray, offset: f32, mut visit: impl FnMut(Candidate)) {
+        let world = self.scene.world();
+        let t_max = world.geometry.intersect(ray, f32::INFINITY).map_or(f32::INFINITY, |h| h.t);
+        let flight = FreeFlight::new(world.media.segment(ray, t_max), Vec3::ONE);
+        if !flight.can_stop() {
+            return;
+        }
+        for i in 0..POINTS_PER_RAY {
+            if let Some(t) = flight.sample_inside((i as f32 + offset) / POINTS_PER_RAY as f32) {
+                visit(Candidate {
+                    position: ray.at(t),
+                    footprint: self.scene.camera.footprint(t, self.frame[1]),
+                });
+            }
+        }
+    }
+
+    /// The record at a point; `None` where it would not be finite.
+    fn record(&self, geometry: &Counted<'_>, point: &Candidate, index: u64, scale: f32) -> Option<Record<3>> {
+        let world = geometry.world(self.scene);
+        let x = point.position;
+        let key = Key {
+            seed: self.seed,
+            purpose: Purpose::Record,
+            index,
+        };
+        let g = gather::multiple(&world, x, self.rays_per_record(), self.max_depth, key);
+        // Lengths over which the field changes: to surfaces, to lamps, a free path, and its own relative gradient.
+        let sum: f32 = g.value.element_sum();
+        let slope: f32 = g.gradient.iter().map(|d| d.length()).sum();
+        let inverse = 1.0 / g.harmonic_mean_distance
+            + 1.0 / world.lights.distance_to_point_lights(x)
+            + world.media.at(x).sigma_t.element_sum() / 3.0
+            + if sum > 0.0 { slope / sum } else { 0.0 };
+        // The log-linear interpolant errs with the square of the radius.
+        let radius = (2.0 * self.error.sqrt()).clamp(0.1, 0.5) / inverse;
+        let radius = radius
+            .min(PAST_SURFACE * g.nearest)
+            .max((2.0 * point.footprint).max(RADIUS_RANGE[0] * scale))
+            .min(RADIUS_RANGE[1] * scale);
+        let finite = g.value.is_finite() && g.gradient.iter().all(|d| d.is_finite());
+        finite.then_some(Record {
+            position: x,
+            radius,
+            value: g.value.max(Vec3::ZERO).to_array(),
+            gradient: g.gradient,
+        })
+    }
+}
+
+/// Drops candidates that an earlier one will probably cover; keeps their order.
+fn thin(candidates: &[Candidate], cache: &Cache<3>, scale: f32) -> Vec<Candidate> {
+    let cell = RADIUS_RANGE[1] * scale;
+    let mut grid: std::collections::HashMap<[i32; 3], Vec<(Vec3, f32)>> = std::collections::HashMap::new();
+    let mut kept = Vec::new();
+    for c in candidates {
+        let mut radius = RADIUS_RANGE[1] * scale;
+        cache.for_each_near(c.position, radius, |_, r| {
+            radius = radius.min(r.radius + RADIUS_SLOPE * r.position.distance(c.position));
+        });
+        let key = (c.position / cell).floor().as_ivec3().to_array();
+        let taken = (-1..=1).any(|dz| {
+            (-1..=1).any(|dy| {
+                (-1..=1).any(|dx| {
+                    let near = [
+                        key[0].wrapping_add(dx),
+                        key[1].wrapping_add(dy),
+                        key[2].wrapping_add(dz),
+                    ];
+                    grid.get(&near).is_some_and(|points| {
+                        points.iter().any(|&(p, r)| p.distance(c.position) < SPACING * r.min(radius))
+                    })
+                })
+            })
+        });
+        if !taken {
+            grid.entry(key).or_default().push((c.position, radius));
+            kept.push(*c);
+        }
+    }
+    kept
+}

@@ -1,0 +1,359 @@
+//! Puts a scene together from what the scene file says and the glTF file holds.
+//!
+//! Whatever refers to another file, or can be judged only beside other things, is checked here; errors name the field.
+
+use crate::camera::Camera;
+use crate::error::{SceneError, Warning};
+use crate::film::FilmSize;
+use crate::gltf::{self, GltfCamera, GltfScene, PunctualLight};
+use crate::lights::{EnvironmentLight, Light, LightSet, SkyLight, read_environment};
+use crate::load::{Fog, LoadOptions};
+use crate::paths::{Folder, PathError};
+use crate::scene::{RenderSettings, Scene};
+use crate::scene_file::{self, Place, SceneFile, numbers};
+use crate::triangles::{Surfaces, Triangles};
+use glam::Vec3;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tyndall_math::{Aabb, Ray};
+use tyndall_media::{Media, Medium, MediumParams, PhaseFunction, Region};
+
+/// A scene being put together.
+pub(crate) struct Assembly<'a> {
+    /// The scene file's text, empty for a bare glTF file.
+    pub(crate) text: &'a str,
+    /// The scene file, or the bare glTF file.
+    pub(crate) path: &'a Path,
+    pub(crate) options: &'a LoadOptions,
+    /// What there was to warn of so far.
+    pub(crate) warnings: Vec<Warning>,
+}
+
+impl Assembly<'_> {
+    /// The scene that `file` and `gltf` make.
+    pub(crate) fn assemble(
+        mut self,
+        file: &SceneFile,
+        gltf: GltfScene,
+    ) -> Result<Scene, SceneError> {
+        self.warnings.extend(gltf.warnings);
+        let film = self.film(file)?;
+        let mut media = self.media(file)?;
+        let lights = self.lights(file, &gltf.lights)?;
+        let surfaces = Arc::new(Surfaces {
+            mesh: gltf.mesh,
+            materials: gltf.materials,
+            textures: gltf.textures,
+        });
+        let (lights, light_of_triangle) = LightSet::new(lights, &surfaces);
+        let geometry = Triangles::new(surfaces, light_of_triangle);
+        let bounded = media.iter().filter_map(|medium| medium.region().bounds());
+        let mut bounds = bounded.fold(geometry.bounds(), Aabb::union);
+        if let Some(fog) = &self.options.fog {
+            let fog = self.fog_in(&bounds, fog)?;
+            bounds = bounds.union(fog.region().bounds().unwrap_or(Aabb::EMPTY));
+            media.push(fog);
+        }
+        let media = Media::new(media);
+        let camera = self.camera(file, &gltf.cameras, &bounds, film)?;
+        self.warn_of_darkness(&lights, &media, camera.eye());
+        Ok(Scene {
+            camera,
+            film,
+            settings: RenderSettings {
+                error: file.render.error.get(),
+                max_depth: file.render.max_depth.map(numbers::Depth::get),
+                exposure: file.render.exposure.get(),
+            },
+            geometry,
+            lights,
+            media,
+            bounds,
+            warnings: self.warnings,
+        })
+    }
+
+    fn film(&self, file: &SceneFile) -> Result<FilmSize, SceneError> {
+        let FilmSize { width, height } = file.film.0;
+        let width = self.options.width.unwrap_or(width);
+        let height = self.options.height.unwrap_or(height);
+        FilmSize::new(width, height).map_err(|error| self.wrong(error))
+    }
+
+    /// The glTF that the scene file names, or nothing where it names none.
+    pub(crate) fn read_gltf(&mut self, file: &SceneFile) -> Result<GltfScene, SceneError> {
+        let Some(name) = &file.gltf else {
+            return Ok(GltfScene::default());
+        };
+        let (path, root) = self.locate(name, "gltf")?;
+        gltf::read(
+            &path,
+            &gltf::ReadOptions {
+                allow_external: self.options.allow_external,
+                root: Some(root),
+                scene: file.gltf_scene.clone(),
+            },
+        )
+    }
+
+    /// The file that a field names, and the folder that it and what it names may not leave.
+    fn locate(&self, name: &str, field: &str) -> Result<(PathBuf, PathBuf), SceneError> {
+        let folder = Folder::of(self.path, self.options.allow_external).map_err(|source| {
+            SceneError::Read {
+                what: "scene's folder",
+                source,
+                path: self.path.into(),
+            }
+        })?;
+        let path = folder
+            .locate(name)
+            .map_err(|error: PathError| self.wrong_field(field, error))?;
+        Ok((path, folder.root().into()))
+    }
+
+    fn lights(
+        &mut self,
+        file: &SceneFile,
+        of_gltf: &[PunctualLight],
+    ) -> Result<Vec<Light>, SceneError> {
+        let mut lights = Vec::new();
+        for (i, light) in file.lights.iter().enumerate() {
+            let light = self.light(light, &format!("lights[{i}]"))?;
+            self.add_light(&mut lights, light, || format!("lights[{i}]"));
+        }
+        for (i, light) in of_gltf.iter().enumerate() {
+            self.add_light(&mut lights, Light::from(light), || {
+                format!("number {} of the glTF file", i + 1)
+            });
+        }
+        Ok(lights)
+    }
+
+    fn add_light(&mut self, lights: &mut Vec<Light>, light: Light, name: impl FnOnce() -> String) {
+        if light.is_dark() {
+            let light = format!("the {} light {}", light.kind(), name());
+            self.warnings.push(Warning::DarkLight { light });
+        } else {
+            lights.push(light);
+        }
+    }
+
+    fn light(
+        &mut self,
+        light: &scene_file::lights::Light,
+        field: &str,
+    ) -> Result<Light, SceneError> {
+        use scene_file::lights::Light as Written;
+        match light {
+            Written::Sky(sky) => Ok(Light::Sky(SkyLight::new(sky.radiance.0))),
+            Written::Environment(environment) => {
+                let field = format!("{field}.file");
+                let (file, _) = self.locate(&environment.file, &field)?;
+                let (image, count) =
+                    read_environment(&file).map_err(|error| self.wrong_field(&field, error))?;
+                if count > 0 {
+                    self.warnings.push(Warning::NegativeTexels { file, count });
+                }
+                let rotation = environment.rotation.get().to_radians();
+                let scale = environment.scale.get();
+                Ok(Light::Environment(EnvironmentLight::new(
+                    image, scale, rotation,
+                )))
+            }
+            Written::Point(point) => Ok(Light::from(&point.placed())),
+            Written::Spot(spot) => Ok(Light::from(&spot.placed())),
+            Written::Directional(directional) => Ok(Light::from(&directional.placed())),
+        }
+    }
+
+    fn media(&self, file: &SceneFile) -> Result<Vec<Medium>, SceneError> {
+        let media = file.media.iter().enumerate();
+        media.map(|(i, medium)| self.medium(i, medium)).collect()
+    }
+
+    fn medium(
+        &self,
+        index: usize,
+        medium: &scene_file::media::Medium,
+    ) -> Result<Medium, SceneError> {
+        let field = format!("media[{index}]");
+        let name = medium
+            .name
+            .clone()
+            .unwrap_or(format!("medium{}", index + 1));
+        let params = MediumParams {
+            name,
+            region: medium.region.placed(),
+            density: medium.density.placed().ok_or_else(|| {
+                self.unsupported(
+                    "density Grid",
+                    "use Constant or Height",
+                    format!("{field}.density"),
+                )
+            })?,
+            sigma_t: medium.sigma_t.0,
+            albedo: medium.albedo.0,
+            phase: match &medium.phase {
+                scene_file::media::PhaseFunction::Isotropic => PhaseFunction::Isotropic,
+                scene_file::media::PhaseFunction::HenyeyGreenstein(lobe) => {
+                    PhaseFunction::henyey_greenstein(lobe.g.get())
+                        .map_err(|error| self.wrong_field(&format!("{field}.phase.g"), error))?
+                }
+                scene_file::media::PhaseFunction::Rayleigh => {
+                    return Err(self.unsupported_phase("Rayleigh", &field));
+                }
+                scene_file::media::PhaseFunction::Mixture(_) => {
+                    return Err(self.unsupported_phase("Mixture", &field));
+                }
+            },
+            emission: medium.emission.0,
+        };
+        Medium::new(params).map_err(|error| self.wrong_field(&field, error))
+    }
+
+    /// Homogeneous fog in `bounds` grown by 1 %.
+    fn fog_in(&self, bounds: &Aabb, fog: &Fog) -> Result<Medium, SceneError> {
+        if bounds.is_empty() {
+            return Err(self.wrong(
+                "--fog fills the scene's bounding box, and this scene has neither surfaces nor bounded media; \
+                 put a Medium with a region into a .ron scene file instead",
+            ));
+        }
+        // Half of 1 % on either side; a flat side grows by that much of the diagonal, for fog needs a volume.
+        let size = bounds.max - bounds.min;
+        let flat = Vec3::splat(bounds.diagonal().max(f32::MIN_POSITIVE));
+        let margin = 0.005 * Vec3::select(size.cmpgt(Vec3::ZERO), size, flat);
+        let phase = PhaseFunction::henyey_greenstein(fog.g)
+            .map_err(|error| self.wrong(format!("--fog: {error}")))?;
+        Medium::new(MediumParams {
+            name: "fog".into(),
+            region: Region::Box {
+                min: bounds.min - margin,
+                max: bounds.max + margin,
+            },
+            phase: if fog.g == 0.0 {
+                PhaseFunction::Isotropic
+            } else {
+                phase
+            },
+            ..MediumParams::new(Vec3::splat(fog.sigma_t), Vec3::splat(fog.albedo))
+        })
+        .map_err(|error| self.wrong(format!("--fog: {error}")))
+    }
+
+    fn camera(
+        &self,
+        file: &SceneFile,
+        of_gltf: &[GltfCamera],
+        bounds: &Aabb,
+        film: FilmSize,
+    ) -> Result<Camera, SceneError> {
+        let chosen = match &file.camera {
+            Some(scene_file::Camera::LookAt(look_at)) => return Ok(look_at.0),
+            Some(scene_file::Camera::Gltf(name)) => Some(
+                of_gltf
+                    .iter()
+                    .find(|camera| camera.is_called(name))
+                    .ok_or_else(|| self.wrong_field("camera", no_such_camera(name, of_gltf)))?,
+            ),
+            None => of_gltf.first(),
+        };
+        match chosen {
+            Some(camera) => Camera::placed(&camera.world_from_camera, camera.yfov)
+                .map_err(|error| self.wrong(error)),
+            None => {
+                let aspect = film.width as f32 / film.height as f32;
+                Camera::framing(bounds, aspect).ok_or_else(|| SceneError::NoCamera {
+                    path: self.path.into(),
+                })
+            }
+        }
+    }
+
+    /// Warns of lights that cannot reach the scene and of scenes that nothing lights.
+    fn warn_of_darkness(&mut self, lights: &LightSet, media: &Media, eye: Vec3) {
+        for light in lights.list() {
+            // Above all fog the way is straight up; parallel light has but one way.
+            let towards = match light {
+                Light::Directional(directional) => -directional.direction(),
+                Light::Sky(_) | Light::Environment(_) => Vec3::Y,
+                _ => continue,
+            };
+            let depth = media.optical_depth(&Ray::new(eye, towards), f32::INFINITY);
+            let unbounded = media.list().iter().find(|medium| {
+                matches!(medium.region(), Region::Everywhere) && !medium.is_vacuum()
+            });
+            if let Some(medium) = unbounded
+                && depth.min_element() == f32::INFINITY
+            {
+                self.warnings.push(Warning::NothingArrives {
+                    light: format!("the {} light", light.kind()),
+                    medium: medium.name().into(),
+                });
+            }
+        }
+        if lights.list().is_empty() && !media.emits() {
+            self.warnings.push(Warning::NoLights);
+        }
+    }
+
+    fn place_of(&self, field: &str) -> Place {
+        let (line, column) = scene_file::place_of(self.text, field);
+        Place {
+            path: self.path.into(),
+            line,
+            column,
+        }
+    }
+
+    fn wrong_field(&self, field: &str, problem: impl ToString) -> SceneError {
+        SceneError::Field {
+            problem: problem.to_string(),
+            field: field.into(),
+            place: self.place_of(field),
+        }
+    }
+
+    fn unsupported(&self, what: &str, mend: &str, field: String) -> SceneError {
+        SceneError::Unsupported {
+            what: what.into(),
+            mend: mend.into(),
+            place: self.place_of(&field),
+            field,
+        }
+    }
+
+    fn unsupported_phase(&self, what: &str, medium: &str) -> SceneError {
+        self.unsupported(
+            &format!("phase function {what}"),
+            "use Isotropic or HenyeyGreenstein",
+            format!("{medium}.phase"),
+        )
+    }
+
+    fn wrong(&self, problem: impl ToString) -> SceneError {
+        SceneError::Whole {
+            problem: problem.to_string(),
+            path: self.path.into(),
+        }
+    }
+}
+
+/// Says which cameras there are instead of `name`.
+fn no_such_camera(name: &str, cameras: &[GltfCamera]) -> String {
+    let names: Vec<_> = cameras
+        .iter()
+        .filter_map(|camera| camera.node.as_ref().or(camera.name.as_ref()))
+        .map(|name| format!("\"{name}\""))
+        .collect();
+    if cameras.is_empty() {
+        format!(
+            "there is no camera \"{name}\": the scene has no glTF file with cameras; use LookAt(…)"
+        )
+    } else {
+        format!(
+            "the glTF file has no camera \"{name}\"; its cameras are {}",
+            names.join(", ")
+        )
+    }
+}

@@ -1,0 +1,282 @@
+//! Light sources: what shines, where samples towards it go, and how much it could bring.
+//!
+//! [`LightSet`] gives a scene's lights to the integrators of `tyndall-transport`. A new kind of light is a file here and a
+//! line in [`Light`].
+
+mod directional;
+mod emission;
+mod emitters;
+mod environment;
+mod environment_file;
+mod flat;
+mod point;
+mod quad;
+mod sky;
+mod spot;
+mod triangle;
+
+#[cfg(test)]
+mod conformance;
+
+pub use directional::DirectionalLight;
+pub use emission::Emission;
+pub use environment::{EnvironmentImage, EnvironmentLight};
+pub use environment_file::{EnvironmentError, read_environment};
+pub use flat::FlatEmitter;
+pub use point::PointLight;
+pub use quad::QuadLight;
+pub use sky::SkyLight;
+pub use spot::SpotLight;
+pub use triangle::TriangleLight;
+
+use crate::gltf::punctual::PunctualLight;
+use crate::triangles::Surfaces;
+use glam::Vec3;
+use std::collections::HashMap;
+use std::f32::consts::PI;
+use std::sync::Arc;
+use tyndall_math::Ray;
+use tyndall_transport::{LightSample, Lights};
+
+/// One light.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// A lamp without extent.
+    Point(PointLight),
+    /// A lamp without extent that shines into a cone.
+    Spot(SpotLight),
+    /// Parallel light from infinitely far away.
+    Directional(DirectionalLight),
+    /// An emitting triangle of a mesh.
+    Triangle(TriangleLight),
+    /// Two emitting triangles that form a rectangle.
+    Quad(QuadLight),
+    /// Light of one colour from all directions.
+    Sky(SkyLight),
+    /// Light from all directions, by an image.
+    Environment(EnvironmentLight),
+}
+
+/// Calls the same method of whatever light it is.
+macro_rules! each {
+    ($light:expr, $inner:ident => $call:expr) => {
+        match $light {
+            Light::Point($inner) => $call,
+            Light::Spot($inner) => $call,
+            Light::Directional($inner) => $call,
+            Light::Triangle($inner) => $call,
+            Light::Quad($inner) => $call,
+            Light::Sky($inner) => $call,
+            Light::Environment($inner) => $call,
+        }
+    };
+}
+
+impl Light {
+    /// What kind of light it is, in the words of the scene file.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Light::Point(_) => "point",
+            Light::Spot(_) => "spot",
+            Light::Directional(_) => "directional",
+            Light::Triangle(_) | Light::Quad(_) => "emissive surface",
+            Light::Sky(_) => "sky",
+            Light::Environment(_) => "environment",
+        }
+    }
+
+    /// Radiant power in W per channel; light from infinitely far away counts what falls on a disc of `scene_radius` metres.
+    pub fn power(&self, scene_radius: f32) -> Vec3 {
+        let disc = PI * scene_radius * scene_radius;
+        match self {
+            Light::Point(light) => light.power(),
+            Light::Spot(light) => light.power(),
+            Light::Directional(light) => light.irradiance() * disc,
+            Light::Triangle(light) => light.flat().power(),
+            Light::Quad(light) => light.flat().power(),
+            Light::Sky(light) => light.fluence() * disc,
+            Light::Environment(light) => light.fluence() * disc,
+        }
+    }
+
+    /// Whether the light sends out nothing at all.
+    pub fn is_dark(&self) -> bool {
+        // A radius of 1 m: any that is not 0 will do.
+        self.power(1.0).max_element() <= 0.0
+    }
+
+    fn importance(&self, p: Vec3, normal: Option<Vec3>) -> f32 {
+        each!(self, light => light.importance(p, normal))
+    }
+
+    fn importance_along(&self, ray: &Ray, t_max: f32) -> f32 {
+        each!(self, light => light.importance_along(ray, t_max))
+    }
+
+    fn pivot(&self) -> Option<Vec3> {
+        match self {
+            Light::Point(light) => Some(light.position()),
+            Light::Spot(light) => Some(light.position()),
+            Light::Triangle(light) => Some(light.flat().center()),
+            Light::Quad(light) => Some(light.flat().center()),
+            Light::Directional(_) | Light::Sky(_) | Light::Environment(_) => None,
+        }
+    }
+
+    fn sample(&self, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        each!(self, light => light.sample(p, u))
+    }
+
+    fn pdf(&self, p: Vec3, w_i: Vec3) -> f32 {
+        match self {
+            Light::Triangle(light) => light.pdf(p, w_i),
+            Light::Quad(light) => light.pdf(p, w_i),
+            Light::Sky(light) => light.pdf(),
+            Light::Environment(light) => light.pdf(w_i),
+            Light::Point(_) | Light::Spot(_) | Light::Directional(_) => 0.0,
+        }
+    }
+}
+
+impl From<&PunctualLight> for Light {
+    fn from(light: &PunctualLight) -> Self {
+        match *light {
+            PunctualLight::Point {
+                position,
+                intensity,
+            } => Light::Point(PointLight::new(position, intensity)),
+            PunctualLight::Spot {
+                position,
+                direction,
+                intensity,
+                inner_cone,
+                outer_cone,
+            } => Light::Spot(SpotLight::new(
+                position, direction, intensity, inner_cone, outer_cone,
+            )),
+            PunctualLight::Directional {
+                direction,
+                irradiance,
+            } => Light::Directional(DirectionalLight::new(direction, irradiance)),
+        }
+    }
+}
+
+/// All lights of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct LightSet {
+    lights: Vec<Light>,
+    environment: Vec<usize>,
+    point_positions: Vec<Vec3>,
+}
+
+impl LightSet {
+    /// The given lights and those that the emissive triangles of `surfaces` are; dark ones are left out.
+    ///
+    /// Returned beside it: the light of each emitting triangle, which [`Triangles::new`](crate::triangles::Triangles::new)
+    /// asks for.
+    pub fn new(
+        lights: impl IntoIterator<Item = Light>,
+        surfaces: &Arc<Surfaces>,
+    ) -> (Self, HashMap<u32, usize>) {
+        let mut set = Self::default();
+        for light in lights.into_iter().filter(|light| !light.is_dark()) {
+            set.push(light);
+        }
+        let mut light_of_triangle = HashMap::new();
+        for emitter in emitters::find(surfaces) {
+            light_of_triangle.extend(emitter.triangles.iter().map(|&t| (t, set.lights.len())));
+            set.push(emitter.light);
+        }
+        (set, light_of_triangle)
+    }
+
+    /// The lights, in the order of their indices.
+    pub fn list(&self) -> &[Light] {
+        &self.lights
+    }
+
+    fn push(&mut self, light: Light) {
+        match &light {
+            Light::Point(point) => self.point_positions.push(point.position()),
+            Light::Spot(spot) => self.point_positions.push(spot.position()),
+            Light::Sky(_) | Light::Environment(_) => self.environment.push(self.lights.len()),
+            Light::Directional(_) | Light::Triangle(_) | Light::Quad(_) => {}
+        }
+        self.lights.push(light);
+    }
+}
+
+impl Lights for LightSet {
+    fn count(&self) -> usize {
+        self.lights.len()
+    }
+
+    fn importance(&self, light: usize, p: Vec3, normal: Option<Vec3>) -> f32 {
+        bounded(self.lights[light].importance(p, normal))
+    }
+
+    fn importance_along(&self, light: usize, ray: &Ray, t_max: f32) -> f32 {
+        bounded(self.lights[light].importance_along(ray, t_max))
+    }
+
+    fn pivot(&self, light: usize) -> Option<Vec3> {
+        self.lights[light].pivot()
+    }
+
+    fn sample(&self, light: usize, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        self.lights[light].sample(p, u)
+    }
+
+    fn pdf(&self, light: usize, p: Vec3, w_i: Vec3) -> f32 {
+        self.lights[light].pdf(p, w_i)
+    }
+
+    fn environment(&self) -> &[usize] {
+        &self.environment
+    }
+
+    fn environment_radiance(&self, light: usize, w_i: Vec3) -> Vec3 {
+        match &self.lights[light] {
+            Light::Sky(sky) => sky.radiance(),
+            Light::Environment(environment) => environment.radiance(w_i),
+            _ => Vec3::ZERO,
+        }
+    }
+
+    fn distance_to_point_lights(&self, p: Vec3) -> f32 {
+        self.point_positions
+            .iter()
+            .map(|lamp| lamp.distance_squared(p))
+            .fold(f32::INFINITY, f32::min)
+            .sqrt()
+    }
+}
+
+/// Keeps estimates such that thousands of them can be summed in f32: a point may lie on a lamp.
+fn bounded(importance: f32) -> f32 {
+    const LARGEST: f32 = 1e30;
+    importance.min(LARGEST)
+}
+
+/// Mean of the three channels: the one number by which lights are compared.
+fn mean(color: Vec3) -> f32 {
+    color.element_sum() / 3.0
+}
+
+/// How much of what a light within `radius` of `center` sends to `p` meets the front of a surface with the geometric
+/// `normal` there: a bound on the cosine, 0 only where the whole light stands behind the surface; 1 in a medium.
+///
+/// The floor keeps lights alive that graze: a shading normal may lean towards them.
+fn facing(p: Vec3, normal: Option<Vec3>, center: Vec3, radius: f32) -> f32 {
+    const LEAST: f32 = 0.1;
+    let Some(normal) = normal else {
+        return 1.0;
+    };
+    let to_light = center - p;
+    let above = normal.dot(to_light) + radius;
+    if above <= 0.0 {
+        return 0.0;
+    }
+    (above / to_light.length().max(f32::MIN_POSITIVE)).clamp(LEAST, 1.0)
+}

@@ -1,0 +1,99 @@
+//! A scene, checked and ready to render.
+
+use crate::camera::Camera;
+use crate::error::Warning;
+use crate::film::FilmSize;
+use crate::lights::LightSet;
+use crate::triangles::Triangles;
+use glam::Vec3;
+use tyndall_math::Aabb;
+use tyndall_media::{Density, Media, Medium};
+use tyndall_transport::World;
+
+/// Everything that is needed to render an image. Made by [`load`](crate::load) and [`load_str`](crate::load_str).
+#[derive(Debug)]
+pub struct Scene {
+    /// Where it is seen from.
+    pub camera: Camera,
+    /// Size of the image.
+    pub film: FilmSize,
+    /// What the scene file asks of the renderer.
+    pub settings: RenderSettings,
+    /// Opaque surfaces.
+    pub geometry: Triangles,
+    /// Light sources, emissive surfaces among them.
+    pub lights: LightSet,
+    /// Participating media.
+    pub media: Media,
+    /// Box around all surfaces and all media that have bounds; empty where there are none.
+    pub bounds: Aabb,
+    /// What was repaired, ignored, or will look odd.
+    pub warnings: Vec<Warning>,
+}
+
+/// What a scene file asks of the renderer; the command line may ask otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Error that the image may have: the root of its relative mean square error.
+    pub error: f32,
+    /// Most scattering events between light and eye; `None` for no limit.
+    pub max_depth: Option<u32>,
+    /// Exposure of PNG images, in stops.
+    pub exposure: f32,
+}
+
+impl Scene {
+    /// The scene as light transport sees it.
+    pub fn world(&self) -> World<'_, Triangles, LightSet> {
+        World {
+            geometry: &self.geometry,
+            lights: &self.lights,
+            media: &self.media,
+        }
+    }
+
+    /// What kinds of media and phase functions there are, as in `media: 1 homogeneous; phase: isotropic`.
+    pub fn summary(&self) -> String {
+        let media = self.media.list();
+        if media.is_empty() {
+            return "media: none".into();
+        }
+        let count = |kind: &str, is: fn(&Density) -> bool| match media
+            .iter()
+            .filter(|medium| is(medium.density()))
+            .count()
+        {
+            0 => None,
+            n => Some(format!("{n} {kind}")),
+        };
+        let kinds: Vec<_> = [
+            count("homogeneous", |density| {
+                matches!(density, Density::Constant(_))
+            }),
+            count("height", |density| {
+                matches!(density, Density::Height { .. })
+            }),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        format!("media: {}; phase: {}", kinds.join(", "), phases(media))
+    }
+}
+
+/// The phase functions of all media that scatter.
+fn phases(media: &[Medium]) -> &'static str {
+    let scatters = |medium: &&Medium| medium.sigma_s() != Vec3::ZERO;
+    let mut isotropic = media
+        .iter()
+        .filter(scatters)
+        .map(|medium| medium.phase().is_isotropic());
+    let Some(first) = isotropic.next() else {
+        return "none";
+    };
+    match (first, isotropic.all(|other| other == first)) {
+        (_, false) => "isotropic and Henyey-Greenstein",
+        (true, true) => "isotropic",
+        (false, true) => "Henyey-Greenstein",
+    }
+}

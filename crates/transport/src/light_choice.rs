@@ -1,0 +1,93 @@
+//! One light of many, chosen by what it could bring.
+//!
+//! Every light's unoccluded, unattenuated contribution is estimated, damped by the fog on the way, and one is picked in
+//! proportion. The estimate steers the choice only; it never enters a result.
+
+use crate::world::Lights;
+use glam::Vec3;
+use smallvec::SmallVec;
+use tyndall_math::Ray;
+
+/// The chances of all lights at one place.
+#[derive(Clone, Debug, Default)]
+pub struct LightChoice {
+    /// Running sum of the lights' importance.
+    cumulative: SmallVec<[f32; 8]>,
+}
+
+/// Optical depth beyond which a light's damping is no longer told apart: it must stay reachable.
+pub(crate) const DEEPEST: f32 = 20.0;
+
+impl LightChoice {
+    /// Chances at the point `p`, on a surface with `normal` or in a medium.
+    /// `sigma` is the extinction there per metre.
+    pub fn at<L: Lights>(lights: &L, p: Vec3, normal: Option<Vec3>, sigma: f32) -> Self {
+        if lights.count() == 1 {
+            return Self::sum(1, |_| 1.0);
+        }
+        Self::sum(lights.count(), |l| {
+            let damping = lights.pivot(l).map_or(1.0, |pivot| {
+                (-(sigma * pivot.distance(p)).min(DEEPEST)).exp()
+            });
+            lights.importance(l, p, normal) * damping
+        })
+    }
+
+    /// Chances for scattering on `ray` between 0 and the finite `t_max`, where the mean extinction is `sigma` per metre.
+    pub fn along<L: Lights>(lights: &L, ray: &Ray, t_max: f32, sigma: f32) -> Self {
+        if lights.count() == 1 {
+            return Self::sum(1, |_| 1.0);
+        }
+        Self::sum(lights.count(), |l| {
+            let damping = lights.pivot(l).map_or(1.0, |pivot| {
+                let t = (pivot - ray.origin).dot(ray.direction).clamp(0.0, t_max);
+                let detour = pivot.distance(ray.at(t));
+                (-(sigma * (t + detour)).min(DEEPEST)).exp()
+            });
+            lights.importance_along(l, ray, t_max) * damping
+        })
+    }
+
+    fn sum(count: usize, importance: impl Fn(usize) -> f32) -> Self {
+        let mut total = 0.0;
+        let cumulative = (0..count)
+            .map(|l| {
+                let weight = importance(l);
+                if weight.is_finite() {
+                    total += weight.max(0.0);
+                }
+                total
+            })
+            .collect();
+        Self { cumulative }
+    }
+
+    fn total(&self) -> f32 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// Picks a light; returns it with its chance.
+    pub fn sample(&self, u: f32) -> Option<(usize, f32)> {
+        let total = self.total();
+        if total <= 0.0 {
+            return None;
+        }
+        let target = u * total;
+        let light = self
+            .cumulative
+            .partition_point(|&c| c <= target)
+            .min(self.cumulative.len() - 1);
+        let pdf = self.pdf(light);
+        (pdf > 0.0).then_some((light, pdf))
+    }
+
+    /// Chance of picking `light`.
+    pub fn pdf(&self, light: usize) -> f32 {
+        let total = self.total();
+        if total <= 0.0 {
+            return 0.0;
+        }
+        let below = if light == 0 { 0.0 } else { self.cumulative[light - 1] };
+        (self.cumulative[light] - below) / total
+    }
+}

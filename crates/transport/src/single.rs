@@ -1,0 +1,161 @@
+//! Single scattering along a ray segment: light that reaches the segment straight from a light and is scattered once.
+//!
+//! A light is chosen for the whole segment, then the distance by a mixture of equiangular sampling around the light
+//! (Kulla and Fajardo 2012), which cancels the pole of 1/r², and of sampling by transmittance.
+
+use crate::free_flight::FreeFlight;
+use crate::light_choice::LightChoice;
+use crate::world::{Geometry, LightSample, Lights, World};
+use glam::Vec3;
+use tyndall_math::{Ray, warp::Equiangular};
+use tyndall_media::MediumPoint;
+
+/// Share of equiangular samples where the light is near enough to have a place.
+const EQUIANGULAR_SHARE: f32 = 0.5;
+/// The light is chosen for the part of the segment that lets through more than e⁻⁸ of the light.
+const CHOICE_DEPTH: f32 = 8.0;
+
+/// Samples single scattering on one segment.
+#[derive(Clone, Debug)]
+pub struct SegmentLight<'m> {
+    ray: Ray,
+    flight: FreeFlight<'m>,
+    choice: LightChoice,
+}
+
+/// Light scattered once on a segment.
+#[derive(Clone, Debug)]
+pub struct SegmentSample<'m> {
+    /// Distance along the ray at which the light is scattered.
+    pub t: f32,
+    /// T σs p L towards the ray's origin, over the sample's density.
+    pub value: Vec3,
+    /// The medium at that point.
+    pub medium: MediumPoint<'m>,
+    /// The way from there to the light.
+    pub light: LightSample,
+    /// Density per metre and steradian of this sample, all choices included.
+    pub pdf: f32,
+}
+
+impl<'m> SegmentLight<'m> {
+    /// Prepares for `ray`; `None` where nothing on it scatters or there is no light.
+    pub fn new<G: Geometry, L: Lights>(
+        world: &World<'m, G, L>,
+        ray: &Ray,
+        flight: &FreeFlight<'m>,
+    ) -> Option<Self> {
+        if !flight.can_stop() || world.lights.count() == 0 {
+            return None;
+        }
+        let (start, end) = flight.segment().range();
+        let total = flight.segment().total();
+        let densest = total.max_position();
+        let end = flight
+            .segment()
+            .distance_at(densest, (0.999 * total[densest]).min(CHOICE_DEPTH))
+            .unwrap_or(end);
+        let length = end - start;
+        let depth = flight.segment().optical_depth(end).element_sum() / 3.0;
+        let from = Ray::new(ray.at(start), ray.direction);
+        Some(Self {
+            ray: *ray,
+            flight: flight.clone(),
+            choice: LightChoice::along(world.lights, &from, length, depth / length.max(f32::MIN_POSITIVE)),
+        })
+    }
+
+    /// The ray the segment lies on.
+    pub fn ray(&self) -> &Ray {
+        &self.ray
+    }
+
+    /// Flights along the segment.
+    pub fn flight(&self) -> &FreeFlight<'m> {
+        &self.flight
+    }
+
+    /// Density per metre with which this light and distance are picked.
+    pub fn pdf<L: Lights>(&self, lights: &L, light: usize, t: f32) -> f32 {
+        let chance = self.choice.pdf(light);
+        if chance > 0.0 {
+            chance * self.distance_pdf(lights.pivot(light), t)
+        } else {
+            0.0
+        }
+    }
+
+    fn equiangular(&self, pivot: Vec3) -> Equiangular {
+        let (start, end) = self.flight.segment().range();
+        Equiangular::new(&self.ray, pivot, start, end)
+    }
+
+    fn distance_pdf(&self, pivot: Option<Vec3>, t: f32) -> f32 {
+        let by_transmittance = self.flight.pdf_inside(t);
+        match pivot {
+            None => by_transmittance,
+            Some(pivot) => {
+                EQUIANGULAR_SHARE * self.equiangular(pivot).pdf(t)
+                    + (1.0 - EQUIANGULAR_SHARE) * by_transmittance
+            }
+        }
+    }
+
+    /// Samples a light, a distance and a way to the light, and tests whether it is free.
+    ///
+    /// `u` picks the light, `v` the distance, `w` the direction.
+    pub fn sample<G: Geometry, L: Lights>(
+        &self,
+        world: &World<'m, G, L>,
+        u: f32,
+        v: f32,
+        w: [f32; 2],
+    ) -> Option<SegmentSample<'m>> {
+        let (light, chance) = self.choice.sample(u)?;
+        let pivot = world.lights.pivot(light);
+        let t = match pivot {
+            Some(pivot) if v < EQUIANGULAR_SHARE => {
+                self.equiangular(pivot).sample(v / EQUIANGULAR_SHARE).0
+            }
+            Some(_) => self
+                .flight
+                .sample_inside((v - EQUIANGULAR_SHARE) / (1.0 - EQUIANGULAR_SHARE))?,
+            None => self.flight.sample_inside(v)?,
+        };
+        let transmittance = self.flight.transmittance_to(t);
+        if transmittance.max_element() <= 0.0 {
+            return None;
+        }
+        let x = self.ray.at(t);
+        let medium = world.media.at(x);
+        let sample = world.lights.sample(light, x, w)?;
+        let scattering = medium.scattering(-self.ray.direction, sample.w_i);
+        let pdf = chance * self.distance_pdf(pivot, t) * sample.pdf;
+        let value = transmittance * scattering * sample.radiance / pdf;
+        if !value.is_finite() || value.max_element() <= 0.0 {
+            return None;
+        }
+        let arrives = unoccluded(world, &Ray::new(x, sample.w_i), sample.distance)?;
+        Some(SegmentSample {
+            t,
+            value: value * arrives,
+            medium,
+            light: sample,
+            pdf,
+        })
+    }
+}
+
+/// Shadow rays end this share of the distance before the light, so that the light's own surface does not shade it.
+const SHADOW_END: f32 = 1.0 - 1e-4;
+
+/// Transmittance to a light `distance` away along `ray`; `None` where a surface stands between.
+pub fn unoccluded<G: Geometry, L>(world: &World<'_, G, L>, ray: &Ray, distance: f32) -> Option<Vec3> {
+    if world.geometry.occluded(ray, distance * SHADOW_END) {
+        return None;
+    }
+    if world.media.is_empty() {
+        return Some(Vec3::ONE);
+    }
+    Some(world.media.optical_depth(ray, distance).map(|tau| (-tau).exp()))
+}

@@ -1,0 +1,67 @@
+//! Running cargo and the `tyndall` program as a user does.
+//!
+//! Cargo sets `CARGO_BIN_EXE_tyndall` only for tests of the package that owns the program. So the first test that wants
+//! it asks cargo to build it, in the profile and target folder of the tests, and takes the path from cargo's messages;
+//! after `cargo test --workspace` there is nothing left to build and this takes a fraction of a second.
+
+use serde_json::Value;
+use std::env;
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+/// The workspace root.
+pub fn workspace() -> &'static Path {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().unwrap_or(manifest)
+}
+
+/// The standard output of cargo at the workspace root.
+///
+/// # Panics
+/// If cargo fails, with what it said.
+pub fn cargo(arguments: &[&str]) -> String {
+    let program = env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
+    let mut command = Command::new(program);
+    command
+        .args(arguments)
+        .current_dir(workspace())
+        .stderr(Stdio::inherit());
+    let output = command.output().expect("cargo can be started");
+    assert!(
+        output.status.success(),
+        "cargo {arguments:?}: {}",
+        output.status
+    );
+    String::from_utf8(output.stdout).expect("cargo writes UTF-8")
+}
+
+/// The path of the `tyndall` program, built on the first call.
+pub fn tyndall() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let format = "--message-format=json-render-diagnostics";
+        let mut arguments = vec!["build", "--package=tyndall-cli", format];
+        if !cfg!(debug_assertions) {
+            arguments.push("--release");
+        }
+        let messages = cargo(&arguments);
+        let executable = messages.lines().find_map(|line| {
+            let message: Value = serde_json::from_str(line).ok()?;
+            Some(PathBuf::from(message["executable"].as_str()?))
+        });
+        executable.expect("cargo names the program it built")
+    })
+}
+
+/// Runs `tyndall` with these arguments in `folder`, without a terminal and without colours.
+pub fn run_tyndall<A: AsRef<OsStr>>(folder: &Path, arguments: &[A]) -> Output {
+    let mut command = Command::new(tyndall());
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .env("NO_COLOR", "1");
+    command.output().expect("tyndall can be started")
+}

@@ -1,0 +1,319 @@
+//! What the outward contract promises, tried on the `tyndall` program as a user runs it.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use tyndall_tests::image::{Channels, Image};
+use tyndall_tests::program::{run_tyndall, workspace};
+
+/// The scene file of the contract, with numbers where it shows dots.
+const EVERY_FIELD: &str = r#"
+Scene(
+    gltf: "cornell.glb",                 // path relative to this file
+    camera: LookAt(eye: (0.0, 1.0, 3.9), target: (0.0, 1.0, 0.0), up: (0.0, 1.0, 0.0), vfov: 39.3),
+    film: Film(width: 1024, height: 768),
+    lights: [                            // added to the glTF's own
+        Point(position: (0.0, 1.9, 0.0), intensity: (8.0, 8.0, 8.0)),
+        Spot(position: (0.0, 1.9, 0.0), direction: (0.0, -1.0, 0.0), intensity: (5.0, 5.0, 5.0), inner_cone: 10.0, outer_cone: 20.0),
+        Directional(direction: (0.3, -1.0, 0.2), irradiance: (1.0, 1.0, 1.0)),
+        Sky(radiance: (0.1, 0.1, 0.2)),
+        Environment(file: "sky.exr", scale: 1.0, rotation: 0.0),
+    ],
+    media: [
+        Medium(
+            name: "fog",
+            region: Everywhere,
+            density: Constant(1.0),
+            sigma_t: (0.5, 0.5, 0.5),
+            albedo: (0.9, 0.9, 0.9),
+            phase: Isotropic,
+            emission: (0.0, 0.0, 0.0),
+        ),
+    ],
+    render: Render(error: 0.03, max_depth: None, exposure: 0.0),
+)
+"#;
+
+/// The shortest scene with fog: all else has its default.
+const FEW_FIELDS: &str = r#"
+Scene(
+    camera: LookAt(eye: (0, 0, 4), target: (0, 0, 0), vfov: 40),
+    lights: [Point(position: (0, 1, 0), intensity: (1, 1, 1))],
+    media: [Medium(sigma_t: (0.5, 0.5, 0.5), albedo: (0.9, 0.9, 0.9))],
+)
+"#;
+
+const INTEGRATORS: [&str; 2] = ["cache", "path"];
+
+/// Runs `tyndall` in `folder` with arguments separated by spaces; returns its standard error.
+fn succeed(folder: &Path, arguments: &str) -> String {
+    let output = run_tyndall(folder, &arguments.split(' ').collect::<Vec<_>>());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.success(),
+        "tyndall {arguments}: {}\n{stderr}",
+        output.status
+    );
+    stderr
+}
+
+/// Renders the shipped Cornell box, small, into `out.exr` of `folder`; returns its channels.
+fn render_cornell(folder: &Path, options: &str) -> Channels {
+    let scene = workspace().join("assets/cornell_box/cornell_box.ron");
+    let scene = scene.display();
+    succeed(
+        folder,
+        &format!("render {scene} -o out.exr --width 24 --height 24 --seed 7 {options}"),
+    );
+    Channels::read(&folder.join("out.exr")).unwrap()
+}
+
+/// A binary glTF with one triangle and a camera.
+fn triangle_glb() -> Vec<u8> {
+    let positions: [f32; 9] = [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0];
+    let buffer: Vec<u8> = positions.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut json = json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0, 1] }],
+        "nodes": [{ "mesh": 0 }, { "name": "eye", "camera": 0, "translation": [0, 1, 4] }],
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "accessors": [{
+            "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3,
+            "min": [-1, 0, 0], "max": [1, 2, 0]
+        }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "byteLength": 36 }],
+    })
+    .to_string();
+    while json.len() % 4 != 0 {
+        json.push(' ');
+    }
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let length = 12 + 8 + json.len() + 8 + buffer.len();
+    let header = [*b"glTF", word(2), word(length)].concat();
+    let text = [&word(json.len()), b"JSON".as_slice(), json.as_bytes()].concat();
+    let binary = [&word(buffer.len()), b"BIN\0".as_slice(), &buffer].concat();
+    [header, text, binary].concat()
+}
+
+#[test]
+fn the_contracts_scene_file_renders() {
+    let folder = TempDir::new().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("scene.ron"), EVERY_FIELD).unwrap();
+    fs::write(file("cornell.glb"), triangle_glb()).unwrap();
+    let sky = Image {
+        size: [8, 4],
+        pixels: vec![glam::Vec3::ONE; 32],
+    };
+    sky.write_exr(&file("sky.exr")).unwrap();
+    for integrator in INTEGRATORS {
+        let options = format!("--integrator {integrator} --width 8 --height 6 --spp 1");
+        succeed(
+            folder.path(),
+            &format!("render scene.ron -o out.exr {options}"),
+        );
+        assert_eq!(Channels::read(&file("out.exr")).unwrap().size, [8, 6]);
+    }
+}
+
+#[test]
+fn fields_left_out_have_their_defaults() {
+    let folder = TempDir::new().unwrap();
+    let with_some = FEW_FIELDS.replace("camera: LookAt(", "gltf: None, camera: Some(LookAt(");
+    let with_some = with_some.replace("vfov: 40)", "vfov: 40))");
+    let mut images = Vec::new();
+    for text in [FEW_FIELDS, &with_some] {
+        fs::write(folder.path().join("scene.ron"), text).unwrap();
+        succeed(
+            folder.path(),
+            "render scene.ron -o out.exr --width 16 --spp 1",
+        );
+        images.push(Image::read(&folder.path().join("out.exr")).unwrap());
+    }
+    assert_eq!(images[0].size, [16, 12], "the default film is 4:3");
+    assert_eq!(
+        images[0], images[1],
+        "options are read with and without Some"
+    );
+}
+
+#[test]
+fn a_bare_gltf_renders_with_fog_from_the_command_line() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("triangle.glb"), triangle_glb()).unwrap();
+    let options = "--fog 0.5,0.9 --width 8 --height 8 --spp 1";
+    succeed(
+        folder.path(),
+        &format!("render triangle.glb -o out.png {options}"),
+    );
+    assert!(folder.path().join("out.png").exists());
+}
+
+#[test]
+fn an_exr_holds_the_default_layers_and_they_sum_to_beauty() {
+    let folder = TempDir::new().unwrap();
+    for integrator in INTEGRATORS {
+        let channels = render_cornell(folder.path(), &format!("--spp 2 --integrator {integrator}"));
+        let names: BTreeSet<String> = channels.samples.keys().cloned().collect();
+        let expected = ["", "surface.", "single.", "multiple."]
+            .map(|layer| ["R", "G", "B"].map(|c| format!("{layer}{c}")));
+        assert_eq!(names, expected.into_iter().flatten().collect());
+
+        let beauty = channels.rgb("").unwrap();
+        let layers = ["surface.", "single.", "multiple."].map(|layer| channels.rgb(layer).unwrap());
+        for (i, &sum) in beauty.pixels.iter().enumerate() {
+            let layers: glam::Vec3 = layers.iter().map(|layer| layer.pixels[i]).sum();
+            // Three roundings of f32, with room for the order of the sum.
+            assert!(
+                (sum - layers).abs().max_element() <= 1e-6 * sum.max_element(),
+                "{integrator}: pixel {i}"
+            );
+        }
+        for layer in &layers {
+            assert!(layer.mean() > 0.0, "{integrator}: an empty layer");
+        }
+    }
+}
+
+#[test]
+fn layers_are_chosen_by_name() {
+    let folder = TempDir::new().unwrap();
+    let channels = render_cornell(folder.path(), "--spp 1 --layers beauty,transmittance,depth");
+    let names: Vec<&str> = channels.samples.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "B",
+            "G",
+            "R",
+            "Z",
+            "transmittance.B",
+            "transmittance.G",
+            "transmittance.R"
+        ]
+    );
+}
+
+#[test]
+fn the_pixels_do_not_depend_on_the_number_of_threads() {
+    let folder = TempDir::new().unwrap();
+    for integrator in INTEGRATORS {
+        let render = |threads| {
+            let options = format!("--spp 2 --integrator {integrator} --threads {threads}");
+            render_cornell(folder.path(), &options).samples
+        };
+        assert!(render(1) == render(2), "{integrator}");
+    }
+}
+
+#[test]
+fn a_crop_shows_the_same_pixels_as_the_whole() {
+    let folder = TempDir::new().unwrap();
+    for integrator in INTEGRATORS {
+        let options = format!("--spp 2 --integrator {integrator}");
+        let whole = render_cornell(folder.path(), &options).rgb("").unwrap();
+        let part = render_cornell(folder.path(), &format!("{options} --crop 8,4,9,5"));
+        let part = part.rgb("").unwrap();
+        let rows = (4..9).flat_map(|y| &whole.pixels[y * 24 + 8..y * 24 + 17]);
+        assert_eq!(part.size, [9, 5]);
+        assert!(part.pixels.iter().eq(rows), "{integrator}");
+    }
+}
+
+#[test]
+fn another_seed_gives_another_image_and_the_same_seed_the_same() {
+    let folder = TempDir::new().unwrap();
+    let render = |seed: u64| {
+        let scene = workspace().join("assets/lamp/lamp.ron");
+        let options = format!("--width 8 --spp 2 --integrator path --seed {seed}");
+        succeed(
+            folder.path(),
+            &format!("render {} -o out.exr {options}", scene.display()),
+        );
+        Image::read(&folder.path().join("out.exr")).unwrap()
+    };
+    assert_eq!(render(0), render(0));
+    assert_ne!(render(0), render(u64::MAX));
+}
+
+#[test]
+fn stats_hold_the_fields_of_the_contract() {
+    let folder = TempDir::new().unwrap();
+    for integrator in INTEGRATORS {
+        render_cornell(
+            folder.path(),
+            &format!("--error 0.5 --integrator {integrator} --stats stats.json"),
+        );
+        let text = fs::read(folder.path().join("stats.json")).unwrap();
+        let stats: Value = serde_json::from_slice(&text).unwrap();
+        let numbers = [
+            "wall_s",
+            "load_s",
+            "fill_s",
+            "render_s",
+            "estimate_s",
+            "lookups",
+            "lookups_missed",
+            "rays",
+            "spp",
+            "threads",
+        ];
+        for key in numbers {
+            assert!(
+                stats[key].is_number(),
+                "{integrator}: {key} is {}",
+                stats[key]
+            );
+        }
+        assert!(stats["records"].is_object() && stats.get("peak_rss_mib").is_some());
+        for key in ["value", "ci95", "bias", "bias_ci95", "samples"] {
+            let estimate = &stats["estimated_error"];
+            assert!(
+                estimate.get(key).is_some(),
+                "{integrator}: estimated_error is {estimate}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_time_limit_leaves_an_image_and_succeeds() {
+    let folder = TempDir::new().unwrap();
+    for integrator in INTEGRATORS {
+        let options = format!("--error 1e-6 --time-limit 0.5 --integrator {integrator}");
+        let image = render_cornell(folder.path(), &options).rgb("").unwrap();
+        assert!(image.pixels.iter().all(|p| p.is_finite()));
+    }
+}
+
+#[test]
+fn the_program_says_at_the_end_what_it_switched_on() {
+    let folder = TempDir::new().unwrap();
+    let scene = workspace().join("assets/lamp/lamp.ron");
+    let render = format!("render {} -o out.exr --width 8 --spp 1", scene.display());
+    let said = succeed(folder.path(), &render);
+    assert!(
+        said.contains("media: 1 homogeneous") && said.contains("phase: isotropic"),
+        "{said}"
+    );
+    assert_eq!(succeed(folder.path(), &format!("{render} --quiet")), "");
+}
+
+#[test]
+fn an_image_compared_with_itself_has_no_error() {
+    let folder = TempDir::new().unwrap();
+    render_cornell(folder.path(), "--spp 1");
+    let output = run_tyndall(folder.path(), &["compare", "out.exr", "out.exr", "--json"]);
+    assert!(output.status.success());
+    let numbers: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for key in ["rmse", "rel_rmse", "rel_mse", "error", "bias", "nan", "inf"] {
+        assert_eq!(numbers[key].as_f64(), Some(0.0), "{key}");
+    }
+}

@@ -1,0 +1,87 @@
+//! Golden images: one test for each shipped scene and integrator, at thumbnail size with fixed samples and seed.
+//!
+//! `cargo xtask golden` runs them, `cargo xtask golden --bless` replaces the images in `tests/golden`. What is compared,
+//! and how closely, stands in `tyndall_tests::golden`.
+
+use anyhow::{Context, Result};
+use glam::Vec3;
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::env;
+use tyndall_render::options::{Integrator, RenderOptions};
+use tyndall_scene::LoadOptions;
+use tyndall_tests::golden::Goldens;
+use tyndall_tests::image::Image;
+use tyndall_tests::program::workspace;
+
+/// Shipped scenes with the size of their thumbnails and the samples per pixel of the two integrators: as many as keep
+/// every golden under a few seconds.
+const SCENES: &[(&str, [u32; 2], [(Integrator, u32); 2])] = &[
+    (
+        "cornell_box",
+        [32, 32],
+        [(Integrator::Cache, 4), (Integrator::Path, 16)],
+    ),
+    (
+        "lamp",
+        [32, 24],
+        [(Integrator::Cache, 4), (Integrator::Path, 16)],
+    ),
+    (
+        "hall",
+        [40, 30],
+        [(Integrator::Cache, 4), (Integrator::Path, 16)],
+    ),
+    (
+        "street",
+        [40, 30],
+        [(Integrator::Cache, 4), (Integrator::Path, 16)],
+    ),
+];
+
+fn main() {
+    let mut trials = Vec::new();
+    for &(scene, size, integrators) in SCENES {
+        for (integrator, spp) in integrators {
+            let name = format!("{scene}_{}", integrator.name());
+            let options = RenderOptions {
+                integrator,
+                spp: Some(spp),
+                width: Some(size[0]),
+                height: Some(size[1]),
+                seed: 1,
+                ..RenderOptions::default()
+            };
+            trials.push(Trial::test(name.clone(), move || {
+                check(&name, scene, &options).map_err(|error| Failed::from(format!("{error:#}")))
+            }));
+        }
+    }
+    libtest_mimic::run(&Arguments::from_args(), trials).exit();
+}
+
+fn check(name: &str, scene: &str, options: &RenderOptions) -> Result<()> {
+    let goldens = Goldens {
+        references: workspace().join("tests/golden"),
+        failures: workspace().join("target/golden-failures"),
+        bless: env::var_os("TYNDALL_BLESS").is_some(),
+    };
+    let path = workspace().join(format!("assets/{scene}/{scene}.ron"));
+    let scene = tyndall_scene::load(&path, &LoadOptions::default())?;
+    let image = tyndall_render::render(&scene, options, &())?.image;
+    let beauty = image.layer("beauty").context("an image without beauty")?;
+    let [r, g, b] = beauty[..]
+        .try_into()
+        .context("beauty without three channels")?;
+    let pixels = r
+        .iter()
+        .zip(g)
+        .zip(b)
+        .map(|((&r, &g), &b)| Vec3::new(r, g, b));
+    goldens.check(
+        name,
+        &Image {
+            size: [image.width, image.height],
+            pixels: pixels.collect(),
+        },
+    )
+}

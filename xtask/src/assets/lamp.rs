@@ -1,0 +1,28 @@
+//! A lamp in fog without bounds and without geometry.
+
+use super::Asset;
+
+const RON: &str = r#"// A lamp in fog that fills all space: its glow is scattered light alone.
+Scene(
+    camera: LookAt(eye: (0.0, 0.0, 4.0), target: (0.0, 0.0, 0.0), vfov: 45.0),
+    film: Film(width: 512, height: 384),
+    lights: [
+        Point(position: (0.0, 0.0, 0.0), intensity: (8.0, 6.4, 4.0)),
+    ],
+    media: [
+        Medium(
+            name: "fog",
+            sigma_t: (0.4, 0.4, 0.4),
+            albedo: (0.9, 0.9, 0.9),
+        ),
+    ],
+)
+"#;
+
+pub(super) fn asset() -> Asset {
+    Asset {
+        name: "lamp",
+        ron: RON,
+        gltf: None,
+    }
+}
