@@ -68,8 +68,7 @@ impl Difference {
                 let sum = |image: &Image| -> Vec3 {
                     let rows = row * TILE..(row * TILE + TILE).min(height);
                     let columns = column * TILE..(column * TILE + TILE).min(width);
-                    rows.map(|y| &image.pixels[y * width..(y + 1) * width][columns.clone()])
-                        .flatten()
+                    rows.flat_map(|y| &image.pixels[y * width..(y + 1) * width][columns.clone()])
                         .sum()
                 };
                 let n = TILE.min(height - row * TILE) * TILE.min(width - column * TILE);

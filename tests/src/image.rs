@@ -73,8 +73,8 @@ impl Image {
             self.pixels.len() == width * height,
             "image of the wrong length"
         );
-        let pixel = |p: exr::Vec2<usize>| self.pixels[p.y() * width + p.x()].into();
-        let pixel = |p| -> (f32, f32, f32) { pixel(p) };
+        let pixel =
+            |p: exr::Vec2<usize>| -> (f32, f32, f32) { self.pixels[p.y() * width + p.x()].into() };
         let channels = exr::SpecificChannels::rgb(pixel);
         let encoding = exr::Encoding::SMALL_LOSSLESS;
         let layer = exr::Layer::new(

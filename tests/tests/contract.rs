@@ -91,7 +91,7 @@ fn triangle_glb() -> Vec<u8> {
         "buffers": [{ "byteLength": 36 }],
     })
     .to_string();
-    while json.len() % 4 != 0 {
+    while !json.len().is_multiple_of(4) {
         json.push(' ');
     }
     let word = |n: usize| (n as u32).to_le_bytes();
@@ -243,17 +243,19 @@ fn another_seed_gives_another_image_and_the_same_seed_the_same() {
     assert_ne!(render(0), render(u64::MAX));
 }
 
+/// The stats of a small render of the Cornell box that aims at an error.
+fn stats(folder: &Path, integrator: &str) -> Value {
+    let options = format!("--error 0.5 --integrator {integrator} --stats stats.json");
+    render_cornell(folder, &options);
+    serde_json::from_slice(&fs::read(folder.join("stats.json")).unwrap()).unwrap()
+}
+
 #[test]
 fn stats_hold_the_fields_of_the_contract() {
     let folder = TempDir::new().unwrap();
     for integrator in INTEGRATORS {
-        render_cornell(
-            folder.path(),
-            &format!("--error 0.5 --integrator {integrator} --stats stats.json"),
-        );
-        let text = fs::read(folder.path().join("stats.json")).unwrap();
-        let stats: Value = serde_json::from_slice(&text).unwrap();
-        let numbers = [
+        let stats = stats(folder.path(), integrator);
+        for key in [
             "wall_s",
             "load_s",
             "fill_s",
@@ -264,8 +266,7 @@ fn stats_hold_the_fields_of_the_contract() {
             "rays",
             "spp",
             "threads",
-        ];
-        for key in numbers {
+        ] {
             assert!(
                 stats[key].is_number(),
                 "{integrator}: {key} is {}",
@@ -273,12 +274,20 @@ fn stats_hold_the_fields_of_the_contract() {
             );
         }
         assert!(stats["records"].is_object() && stats.get("peak_rss_mib").is_some());
-        for key in ["value", "ci95", "bias", "bias_ci95", "samples"] {
-            let estimate = &stats["estimated_error"];
-            assert!(
-                estimate.get(key).is_some(),
-                "{integrator}: estimated_error is {estimate}"
-            );
+    }
+}
+
+#[test]
+fn the_estimated_error_comes_with_its_intervals() {
+    let folder = TempDir::new().unwrap();
+    for integrator in INTEGRATORS {
+        let estimate = &stats(folder.path(), integrator)["estimated_error"];
+        for key in ["value", "bias", "samples"] {
+            assert!(estimate[key].is_number(), "{integrator}: {estimate}");
+        }
+        for key in ["ci95", "bias_ci95"] {
+            let interval = estimate[key].as_array().map(Vec::len);
+            assert_eq!(interval, Some(2), "{integrator}: {estimate}");
         }
     }
 }

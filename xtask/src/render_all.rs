@@ -17,7 +17,7 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 0.03)]
     error: f64,
     /// Seconds after which each image is kept as good as it then is
-    #[arg(long, default_value_t = 90.0)]
+    #[arg(long, default_value_t = 60.0)]
     time_limit: f64,
     /// `cache` or `path`
     #[arg(long)]

@@ -12,7 +12,7 @@ const OVERLAP: f32 = 8.0;
 /// Points on one march through the cube; neighbouring ones are about a thirtieth of a radius apart at 10⁴ records.
 const STEPS: usize = 512;
 
-/// Uniform numbers in [0, 1): SplitMix64 (Steele et al. 2014).
+/// Uniform numbers in [0, 1): `SplitMix64` (Steele et al. 2014).
 struct Random(u64);
 
 impl Random {

@@ -15,7 +15,8 @@ use std::ops::Range;
 /// Filling needs `&mut self` and reading `&self`, so that threads may read together between two batches. Every answer
 /// follows from the records and their order alone: bits do not depend on how they were divided into batches.
 ///
-/// Memory for three channels: about half a kilobyte a record; a record is listed in at most 27 cells, mostly 12.
+/// Memory for three channels: about 550 bytes a record where balls overlap, 2 kB where they stand alone. Most of it are
+/// the lists of cells: a record is in at most 27 of them, mostly in 12.
 #[derive(Clone, Debug, Default)]
 pub struct Cache<const N: usize> {
     records: Vec<Record<N>>,
@@ -37,11 +38,11 @@ impl<const N: usize> Cache<N> {
         }
     }
 
-    /// Appends records and builds the index anew: about a microsecond per record held, so insert in batches.
+    /// Appends records and builds the index anew: one to four microseconds per record held, so insert in batches.
     ///
     /// # Errors
     /// If a number in a record is not finite, a value is negative, a radius is not positive (1.2e-38 to 8.5e37), or
-    /// there are too many records (67 million). The cache is unchanged then.
+    /// there are too many records (33 million). The cache is unchanged then.
     pub fn insert(&mut self, batch: Vec<Record<N>>) -> Result<(), CacheError> {
         let n_records = self.records.len() + batch.len();
         if n_records > MAX_RECORDS {
@@ -109,7 +110,8 @@ impl<const N: usize> Cache<N> {
     /// As [`Cache::lookup`]; where no record is valid, from the nearest ones, measured by their radii.
     ///
     /// All radii are doubled until a ball holds `p`, and the records whose balls then do are blended. `None` only for an
-    /// empty cache or a point that is not finite. Beyond four radii every record is tried: time grows with their number.
+    /// empty cache or a point that is not finite. About a microsecond up to four radii from a record; further out every
+    /// record is tried.
     pub fn lookup_extended(&self, p: Vec3) -> Option<[f32; N]> {
         if let Some(value) = self.lookup(p) {
             return Some(value);

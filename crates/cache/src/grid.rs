@@ -59,7 +59,8 @@ pub(crate) struct Grid {
 
 impl Grid {
     pub(crate) fn new(exponent: SideExponent) -> Self {
-        let side = f64::from(exponent).exp2();
+        // 2^exponent, from its bits: exact on every machine.
+        let side = f64::from_bits(((1023 + exponent) as u64) << 52);
         Self {
             side,
             inv_side: 1.0 / side,

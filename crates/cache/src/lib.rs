@@ -29,7 +29,7 @@
 //!
 //! let p = Vec3::new(0.33, 0.05, 0.1);
 //! let [light] = cache.lookup(p).expect("records are valid around p");
-//! assert!((light / sample(p).value[0] - 1.0).abs() < 0.005);
+//! assert!((light / sample(p).value[0] - 1.0).abs() < 0.02, "within 2 %");
 //! assert_eq!(cache.lookup(Vec3::splat(50.0)), None, "sample there and insert what you find");
 //! # Ok::<(), tyndall_cache::CacheError>(())
 //! ```
@@ -61,3 +61,8 @@ mod record;
 pub use cache::Cache;
 pub use error::{CacheError, Field};
 pub use record::Record;
+
+/// Compiles the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -26,9 +26,12 @@ pub(crate) fn clamp(balls: &[Ball], slope: f32) -> Vec<f32> {
     loop {
         tree.set_radii(&radii);
         let mut changed = false;
-        for (ball, radius) in balls.iter().zip(&mut radii) {
+        // In the tree's order, so that neighbours walk over the same nodes while these are at hand.
+        for &index in &tree.order {
+            let radius = &mut radii[index as usize];
             let keep = f64::from(*radius) * (1.0 - TOLERANCE);
-            let bound = tree.least_bound(0, ball.centre.as_dvec3(), slope, keep);
+            let centre = balls[index as usize].centre.as_dvec3();
+            let bound = tree.least_bound(0, centre, slope, keep);
             if bound < keep {
                 *radius = bound as f32;
                 changed = true;

@@ -10,8 +10,8 @@ use crate::grid::{Ball, CellBox, Grid, SideExponent, key, side_exponent};
 use glam::Vec3;
 use std::ops::Range;
 
-/// Most records an octree holds: each lies in up to 27 cells (64 with room for rounding), and list places are `u32`.
-pub(crate) const MAX_RECORDS: usize = (u32::MAX / 64) as usize;
+/// Most records an octree holds: places in lists are `u32`, and 27 cells with a block for each ball are 108 places.
+pub(crate) const MAX_RECORDS: usize = (u32::MAX / 128) as usize;
 
 /// Records by place.
 #[derive(Clone, Debug, Default)]

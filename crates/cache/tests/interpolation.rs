@@ -129,13 +129,10 @@ fn nothing_jumps_where_a_ball_ends() {
         let [before, after] =
             [rim - step, rim + step].map(|x| cache.lookup(Vec3::new(x, 0.0, 0.0)).unwrap());
         for channel in 0..2 {
-            // Over this step the field's own gradient changes it by less than a part in 10⁴; weights by 3 (step)².
-            assert_close(
-                after[channel],
-                before[channel],
-                2e-4,
-                Vec3::new(rim, 0.0, 0.0),
-            );
+            // The values' own gradients, about 2.2 per unit of length, change them by 5e-4 over this step, and the
+            // weights by 3 (step)² near the rim. A jump would be of the size of the values.
+            let change = (after[channel] - before[channel]).abs();
+            assert!(change < 1e-3, "{before:?} and {after:?} at {rim}");
         }
     }
 }

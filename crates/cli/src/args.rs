@@ -46,13 +46,13 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "E", value_parser = value::finite, allow_negative_numbers = true)]
     pub(crate) error: Option<f32>,
     /// Fix the samples per pixel instead.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(crate) spp: Option<u32>,
     /// Width of the frame in pixels; alone, it keeps the scene's proportions.
-    #[arg(long, value_name = "W")]
+    #[arg(long, value_name = "W", allow_negative_numbers = true)]
     pub(crate) width: Option<u32>,
     /// Height of the frame in pixels; alone, it keeps the scene's proportions.
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub(crate) height: Option<u32>,
     /// Render only this part of the frame, in pixels from its upper left corner.
     #[arg(long, value_name = "X,Y,W,H", value_parser = value::crop, allow_hyphen_values = true)]
@@ -61,10 +61,15 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "N|none", value_parser = value::depth, allow_hyphen_values = true)]
     pub(crate) max_depth: Option<Depth>,
     /// Chooses the random numbers; equal seeds give equal images.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        allow_negative_numbers = true
+    )]
     pub(crate) seed: u64,
     /// Number of threads; the image does not depend on it.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// Stop after so many seconds with the best image so far.
     #[arg(long, value_name = "S", value_parser = value::seconds, allow_hyphen_values = true)]
@@ -110,7 +115,12 @@ pub(crate) struct ProbeArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = value::vector, allow_hyphen_values = true)]
     pub(crate) dir: Option<[f32; 3]>,
     /// Number of gather directions, or of paths with --integrator path.
-    #[arg(long, value_name = "N", default_value_t = 4096)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 4096,
+        allow_negative_numbers = true
+    )]
     pub(crate) samples: u32,
     /// How light is computed.
     #[arg(long, value_enum, default_value_t)]
@@ -301,7 +311,8 @@ mod tests {
             ("render s.ron --layers beauty,albedo", "`albedo`"),
             ("render s.ron --fog 0.1,2", "albedo must be from 0 to 1"),
             ("render s.ron --time-limit -3", "--time-limit <S>"),
-            ("render s.ron --spp -1", "--spp"),
+            ("render s.ron --spp -1", "--spp <N>"),
+            ("render s.ron --seed -1", "--seed <N>"),
             ("render", "<SCENE>"),
             ("compare a.exr", "<B>"),
             ("probe s.ron --at 1,2", "--at <X,Y,Z>"),

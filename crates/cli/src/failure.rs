@@ -12,14 +12,15 @@ static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
 /// Stops panics from printing; [`catch`] tells those that nobody else caught.
 pub(crate) fn keep_panics_quiet() {
     std::panic::set_hook(Box::new(|panic| {
-        let message = panic
-            .payload_as_str()
-            .unwrap_or("a panic without a message");
+        let payload = panic.payload();
+        let text = payload.downcast_ref::<&str>().copied();
+        let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+        let message = text.unwrap_or("a panic without a message");
         let place = panic
             .location()
             .map(|at| format!(" ({}:{})", at.file(), at.line()));
-        let text = format!("{message}{}", place.unwrap_or_default()).replace('\n', " ");
-        *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
+        let line = format!("{message}{}", place.unwrap_or_default()).replace('\n', " ");
+        *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
     }));
 }
 

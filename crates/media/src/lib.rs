@@ -63,3 +63,8 @@ pub use phase::{Asymmetry, AsymmetryError, HenyeyGreenstein, PhaseFunction};
 pub use point::MediumPoint;
 pub use region::Region;
 pub use segment::Segment;
+
+/// Compiles and runs the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -122,7 +122,9 @@ fn clip_box(line: &Line, min: DVec3, max: DVec3) -> Option<(f64, f64)> {
             }
             continue;
         }
-        let (a, b) = ((min[axis] - o) / d, (max[axis] - o) / d);
+        // f64 has room for the reciprocal of every f32 but 0, denormal ones too.
+        let per_metre = 1.0 / d;
+        let (a, b) = ((min[axis] - o) * per_metre, (max[axis] - o) * per_metre);
         enter = enter.max(a.min(b));
         leave = leave.min(a.max(b));
     }

@@ -136,7 +136,7 @@ impl Film {
     }
 
     /// Estimated error of the image so far, from its two halves: the square root of the mean of V w, where
-    /// V = (a − b)² n_a n_b / (n_a + n_b)² estimates the variance of a pixel's value from the means a, b of its even and odd samples
+    /// V = (a − b)² n m / (n + m)² estimates the variance of a pixel's value from the means a, b of its n even and m odd samples
     /// (((a − b)/2)² for halves of one size), and w is the weight of the relative error at the image's 5 × 5 median.
     ///
     /// `None` until every pixel has two samples. Unbiased (before the root) where the samples of the two halves are independent.

@@ -127,7 +127,7 @@ pub enum Warning {
          region"
     )]
     NothingArrives {
-        /// Which light, as in "the directional light lights[0]".
+        /// Which light, as in "the directional light".
         light: String,
         /// Name of the first unbounded medium.
         medium: String,

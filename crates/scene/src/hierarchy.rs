@@ -4,7 +4,7 @@
 //! left to [`crate::triangles`].
 
 use crate::watertight::{ShearedRay, TriangleHit};
-use glam::{Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::PlocBuilder;
@@ -35,6 +35,8 @@ pub struct Met {
     pub hit: TriangleHit,
     /// The point, in metres; more accurate than the ray at the distance.
     pub position: Vec3,
+    /// Unit normal of the side on which the corners wind counter-clockwise.
+    pub front_normal: Vec3,
 }
 
 impl Hierarchy {
@@ -122,6 +124,7 @@ impl Hierarchy {
             triangle: self.triangle_of_slot[slot],
             hit: TriangleHit { t, barycentric },
             position: position / self.scale,
+            front_normal: geometric_normal([a, b, c]),
         })
     }
 
@@ -157,6 +160,14 @@ impl Hierarchy {
         };
         Some((traversal, ShearedRay::new(&scaled)))
     }
+}
+
+/// The unit normal of the side on which `corners` wind counter-clockwise.
+///
+/// In f64, where the cross product of f32 edges keeps its direction for needles too; +Y for a triangle without area.
+pub(crate) fn geometric_normal(corners: [Vec3; 3]) -> Vec3 {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3()
 }
 
 /// The three steps of `obvhs`'s `build_cwbvh` with its `medium_build` preset, without its debug check, whose tolerance is an
@@ -264,8 +275,7 @@ mod tests {
         ] {
             // The stack of obvhs holds 32 levels; the bounds leave some room over what was measured.
             let levels = depth(&hierarchy.bvh, 0);
-            eprintln!("{name}: {levels}");
-            assert!(levels <= 32);
+            assert!(levels <= most, "{name}: {levels} levels");
         }
     }
 

@@ -4,7 +4,7 @@
 //! paragraph that says what is wrong, where, and what would mend it. What was repaired on the way is a [`Warning`].
 //!
 //! Three things to know:
-//! * [`load`] turns a `.ron` scene file, or a bare `.glb` or `.gltf` together with fog, into a scene; [`load_str`] takes text.
+//! * [`load()`] turns a `.ron` scene file, or a bare `.glb` or `.gltf` together with fog, into a scene; [`load_str`] takes text.
 //! * [`Scene`] holds camera, film, surfaces, lights and media; [`Scene::world`] is how `tyndall-transport` sees it.
 //! * [`SceneFile`] is what a scene file may say, as checked types: a number out of range cannot exist in it.
 //!

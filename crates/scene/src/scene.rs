@@ -10,7 +10,7 @@ use tyndall_math::Aabb;
 use tyndall_media::{Density, Media, Medium};
 use tyndall_transport::World;
 
-/// Everything that is needed to render an image. Made by [`load`](crate::load) and [`load_str`](crate::load_str).
+/// Everything that is needed to render an image. Made by [`load`](crate::load()) and [`load_str`](crate::load_str).
 #[derive(Debug)]
 pub struct Scene {
     /// Where it is seen from.

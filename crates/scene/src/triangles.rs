@@ -7,7 +7,7 @@ use crate::material::Material;
 use crate::mesh::TriangleMesh;
 use crate::texture::Texture;
 use crate::watertight::TriangleHit;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::Arc;
 use tyndall_math::{Aabb, Ray};
@@ -104,6 +104,7 @@ impl Geometry for Triangles {
             triangle,
             hit,
             position,
+            front_normal,
         } = self
             .hierarchy
             .nearest(ray, t_max, |triangle, hit| self.is_solid(triangle, hit))?;
@@ -111,7 +112,6 @@ impl Geometry for Triangles {
         let material = self.surfaces.material(triangle);
         let index = triangle as usize;
 
-        let front_normal = geometric_normal(mesh.corners(index));
         let front = front_normal.dot(ray.direction) < 0.0;
         let normal = if front { front_normal } else { -front_normal };
         let [n0, n1, n2] = mesh.indices[index].map(|i| mesh.normals[i as usize]);
@@ -142,14 +142,6 @@ impl Geometry for Triangles {
         self.hierarchy
             .any(ray, t_max, |triangle, hit| self.is_solid(triangle, hit))
     }
-}
-
-/// The unit normal of the side on which `corners` wind counter-clockwise.
-///
-/// In f64, where the cross product of f32 edges keeps its direction for needles too; +Y for a triangle without area.
-pub(crate) fn geometric_normal(corners: [Vec3; 3]) -> Vec3 {
-    let [a, b, c] = corners.map(|p| p.as_dvec3());
-    (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3()
 }
 
 /// The interpolated normal on the viewer's side of the surface, never pointing away from the viewer.

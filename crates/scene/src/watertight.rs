@@ -2,7 +2,7 @@
 //!
 //! The test is double-sided and gives barycentric coordinates. Boxes around triangles are somebody else's concern.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 use tyndall_math::Ray;
 
 /// A ray prepared for many triangles: its axes permuted and sheared so that it points along z.
@@ -13,9 +13,10 @@ use tyndall_math::Ray;
 /// f64, where the products of f32 differences are exact.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
-    origin: Vec3,
-    axes: [usize; 3],
-    shear: Vec3,
+    origin: Vec3A,
+    /// Permutation and shear as the columns of a matrix. Its ones and zeros multiply and add without rounding, so it
+    /// gives the very numbers of the paper's formula, without an index that is known only at run time.
+    columns: [Vec3A; 3],
 }
 
 /// A point where a ray meets a triangle.
@@ -44,23 +45,22 @@ impl ShearedRay {
             // Keeps the winding of triangles in the permuted axes.
             std::mem::swap(&mut x, &mut y);
         }
+        let mut columns = [Vec3A::ZERO; 3];
+        columns[x] = Vec3A::X;
+        columns[y] = Vec3A::Y;
+        columns[z] = Vec3A::new(-d[x] / d[z], -d[y] / d[z], 1.0 / d[z]);
         Self {
-            origin: ray.origin,
-            axes: [x, y, z],
-            shear: Vec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]),
+            origin: ray.origin.into(),
+            columns,
         }
     }
 
     /// Where the ray meets the triangle of `corners` at a distance t with 0 < t < `t_max`, from either side.
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
-        let [x, y, z] = self.axes;
+        let [x, y, z] = self.columns;
         let [a, b, c] = corners.map(|corner| {
-            let p = corner - self.origin;
-            Vec3::new(
-                p[x] - self.shear.x * p[z],
-                p[y] - self.shear.y * p[z],
-                self.shear.z * p[z],
-            )
+            let p = Vec3A::from(corner) - self.origin;
+            x * p.x + y * p.y + z * p.z
         });
         let u = c.x * b.y - c.y * b.x;
         let v = a.x * c.y - a.y * c.x;
@@ -83,7 +83,7 @@ impl ShearedRay {
 
 /// The same test in f64, for a triangle in the ray's sheared axes with an edge function that vanished in f32.
 #[cold]
-fn intersect_at_an_edge(corners: [Vec3; 3], t_max: f32) -> Option<TriangleHit> {
+fn intersect_at_an_edge(corners: [Vec3A; 3], t_max: f32) -> Option<TriangleHit> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let u = c.x * b.y - c.y * b.x;
     let v = a.x * c.y - a.y * c.x;

@@ -317,7 +317,6 @@ fn the_shared_scenes_load() {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets/scenes");
     for name in [
         "cornell_bevy/CornellBox.glb",
-        "volumetric_fog_example",
         "milk_truck/CesiumMilkTruck.glb",
     ] {
         let path = assets.join(name);

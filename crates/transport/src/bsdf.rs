@@ -11,7 +11,7 @@ const MIN_ALPHA: f32 = 1e-3;
 
 /// Reflection at one surface point.
 ///
-/// f = (1 − F) diffuse/π + F D G / (4 cosθ_i cosθ_o),  F = f0 + (f90 − f0)(1 − w_o·h)⁵
+/// f = (1 − F) diffuse/π + F D G / (4 cosθᵢ cosθₒ),  F = f0 + (f90 − f0)(1 − `w_o`·h)⁵
 ///
 /// glTF 2.0 specification, appendix B.3.5; D and G are GGX with the height-correlated Smith term (Heitz 2014, equations 71 and 99).
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +28,7 @@ pub struct Bsdf {
 pub struct BsdfSample {
     /// Unit direction in which the path goes on.
     pub w_i: Vec3,
-    /// f · |cosθ_i|, per steradian.
+    /// f · |cosθᵢ|, per steradian.
     pub value: Vec3,
     /// Density of `w_i` per steradian.
     pub pdf: f32,
@@ -77,7 +77,7 @@ impl Bsdf {
         if d + s > 0.0 { d / (d + s) } else { 1.0 }
     }
 
-    /// f · cosθ_i for light from `w_i` leaving along `w_o`, per steradian; 0 where either is below the surface.
+    /// f · cosθᵢ for light from `w_i` leaving along `w_o`, per steradian; 0 where either is below the surface.
     pub fn eval(&self, w_o: Vec3, w_i: Vec3) -> Vec3 {
         let (cos_o, cos_i) = (self.normal.dot(w_o), self.normal.dot(w_i));
         if cos_o <= 0.0 || cos_i <= 0.0 {
@@ -102,7 +102,7 @@ impl Bsdf {
         let mut pdf = share * cos_i * FRAC_1_PI;
         if share < 1.0 {
             let h = (w_o + w_i).normalize_or_zero();
-            // Density of visible normals over 4 w_o·h: G1 D / (4 cosθ_o) (Heitz 2018, equation 17).
+            // Density of visible normals over 4 w_o·h: G1 D / (4 cosθₒ) (Heitz 2018, equation 17).
             let g1 = 2.0 * cos_o / (cos_o + smith_root(cos_o, self.alpha));
             pdf += (1.0 - share) * g1 * ggx_d(self.normal.dot(h), self.alpha) / (4.0 * cos_o);
         }
@@ -144,7 +144,7 @@ fn smith_root(cos: f32, alpha: f32) -> f32 {
     (a2 + (1.0 - a2) * cos * cos).sqrt()
 }
 
-/// G / (4 cosθ_i cosθ_o) with the height-correlated Smith term.
+/// G / (4 cosθᵢ cosθₒ) with the height-correlated Smith term.
 fn smith_v(cos_o: f32, cos_i: f32, alpha: f32) -> f32 {
     0.5 / (cos_i * smith_root(cos_o, alpha) + cos_o * smith_root(cos_i, alpha))
         .max(f32::MIN_POSITIVE)
@@ -164,6 +164,7 @@ fn visible_normal(w_o: Vec3, alpha: f32, u: [f32; 2]) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
     use tyndall_math::{Key, Purpose, Sampler};
 
@@ -233,7 +234,10 @@ mod tests {
                 })
                 .count() as f64
                 / 20_000.0;
-            assert!((integral - above).abs() < 0.02, "{bsdf:?}: {integral} against {above}");
+            assert!(
+                (integral - above).abs() < 0.02,
+                "{bsdf:?}: {integral} against {above}"
+            );
         }
     }
 

@@ -51,7 +51,12 @@ fn distance(flight: &FreeFlight<'_>, u: f32) -> Option<(f32, f32)> {
     } else {
         flight.sample_inside((u - share) / (1.0 - share))?
     };
-    let mut pdf = (1.0 - share) * if share < 1.0 { flight.pdf_inside(t) } else { 0.0 };
+    let mut pdf = (1.0 - share)
+        * if share < 1.0 {
+            flight.pdf_inside(t)
+        } else {
+            0.0
+        };
     if share > 0.0 {
         pdf += share * even;
     }

@@ -68,7 +68,10 @@ impl<'m> FreeFlight<'m> {
 
     /// Density per metre of a flight that ends at `t`: Σ w σt T.
     pub fn pdf(&self, t: f32) -> f32 {
-        mixture(self.weights, self.segment.sigma_t(t) * self.transmittance_to(t))
+        mixture(
+            self.weights,
+            self.segment.sigma_t(t) * self.transmittance_to(t),
+        )
     }
 
     /// Chance of passing the whole segment: Σ w T.
@@ -85,7 +88,7 @@ impl<'m> FreeFlight<'m> {
             .distance_at(channel, tau.min(self.total[channel] * (1.0 - f32::EPSILON)))
     }
 
-    /// Density per metre of [`FreeFlight::sample_inside`]: Σ w σt T / (1 − T_total).
+    /// Density per metre of [`FreeFlight::sample_inside`]: Σ w σt T / (1 − T of all).
     pub fn pdf_inside(&self, t: f32) -> f32 {
         let flux = self.segment.sigma_t(t) * self.transmittance_to(t);
         (0..3)

@@ -63,11 +63,16 @@ pub fn multiple<G: Geometry, L: Lights>(
                 max_depth: max_depth.map(|d| d.saturating_sub(1)),
             };
             let uniform = 0.25 / PI;
-            (start, uniform / ((1.0 - lamps.share()) * uniform + lamps.pdf(w)))
+            (
+                start,
+                uniform / ((1.0 - lamps.share()) * uniform + lamps.pdf(w)),
+            )
         })
         .collect();
     let distances = || {
-        let met = starts.iter().filter_map(|(s, weight)| Some((s.hit.flatten()?.t, *weight)));
+        let met = starts
+            .iter()
+            .filter_map(|(s, weight)| Some((s.hit.flatten()?.t, *weight)));
         met.map(|(t, weight)| (t.max(f32::MIN_POSITIVE), weight))
     };
     let nearest = distances().map(|(t, _)| t).fold(f32::INFINITY, f32::min);
@@ -79,7 +84,11 @@ pub fn multiple<G: Geometry, L: Lights>(
         let mut sampler = Sampler::new(key, i as u64);
         let mut visitor = WarpVisitor::new(world.media, x, radius);
         trace(world, start, &mut sampler, &mut visitor);
-        batches.add(i, visitor.value * *weight, visitor.gradient.map(|d| d * *weight));
+        batches.add(
+            i,
+            visitor.value * *weight,
+            visitor.gradient.map(|d| d * *weight),
+        );
     }
     let [value, dr, dg, db] = batches.means();
     let [value_error, er, eg, eb] = batches.errors();
@@ -100,7 +109,11 @@ fn warp_radius<G, L: Lights>(world: &World<'_, G, L>, x: Vec3, nearest: f32) -> 
     let boundary = world.media.distance_to_boundary(x);
     let sigma = world.media.at(x).sigma_t.max_element();
     // Without anything near, a few free paths: farther vertices need no displacement.
-    let free = if sigma > 0.0 { 4.0 / sigma } else { f32::INFINITY };
+    let free = if sigma > 0.0 {
+        4.0 / sigma
+    } else {
+        f32::INFINITY
+    };
     let reach = WARP_REACH * solid.min(boundary).min(free);
     reach
         .max(WARP_REACH_MIN * solid.min(free))
@@ -126,9 +139,7 @@ impl Batches {
 
     fn means(&self) -> [Vec3; 4] {
         let n = self.counts.iter().sum::<usize>().max(1) as f64;
-        std::array::from_fn(|k| {
-            (self.sums.iter().map(|s| s[k]).sum::<glam::DVec3>() / n).as_vec3()
-        })
+        std::array::from_fn(|k| (self.sums.iter().map(|s| s[k]).sum::<glam::DVec3>() / n).as_vec3())
     }
 
     /// Standard errors from the spread of batch means; infinite where fewer than two batches hold samples.
@@ -144,7 +155,11 @@ impl Batches {
                 .map(|&b| self.sums[b][k] / self.counts[b] as f64)
                 .collect();
             let mean = means.iter().sum::<glam::DVec3>() / n;
-            let var = means.iter().map(|m| (*m - mean) * (*m - mean)).sum::<glam::DVec3>() / (n - 1.0);
+            let var = means
+                .iter()
+                .map(|m| (*m - mean) * (*m - mean))
+                .sum::<glam::DVec3>()
+                / (n - 1.0);
             (var / n).as_vec3().map(f32::sqrt)
         })
     }

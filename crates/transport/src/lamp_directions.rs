@@ -22,7 +22,13 @@ pub struct LampDirections {
 impl LampDirections {
     /// The lamps as seen from `p`, with chances `choice` there; together they get at most `share` of the directions, the
     /// less the more fog of extinction `sigma` per metre lies between: what is deep in fog has no bright lamp to pass.
-    pub fn new<L: Lights>(lights: &L, p: Vec3, choice: &LightChoice, share: f32, sigma: f32) -> Self {
+    pub fn new<L: Lights>(
+        lights: &L,
+        p: Vec3,
+        choice: &LightChoice,
+        share: f32,
+        sigma: f32,
+    ) -> Self {
         let lamps: SmallVec<[(Vec3, f32); 8]> = (0..lights.count())
             .filter_map(|l| {
                 let offset = lights.pivot(l)? - p;

@@ -87,7 +87,11 @@ impl LightChoice {
         if total <= 0.0 {
             return 0.0;
         }
-        let below = if light == 0 { 0.0 } else { self.cumulative[light - 1] };
+        let below = if light == 0 {
+            0.0
+        } else {
+            self.cumulative[light - 1]
+        };
         (self.cumulative[light] - below) / total
     }
 }

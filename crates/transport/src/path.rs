@@ -17,6 +17,8 @@ use tyndall_media::MediumPoint;
 const SETS_PER_STRETCH: u32 = 3;
 /// Scattering events before Russian roulette may end a path.
 const ROULETTE_AFTER: u32 = 3;
+/// Paths are ended once their throughput is below the inverse of this.
+const ROULETTE_GAIN: f32 = 4.0;
 /// Smallest chance of survival: bounds the weight a survivor gains.
 const SURVIVAL_MIN: f32 = 0.1;
 /// A path that keeps its throughput for ever (albedo 1 without a way out) is ended at this rate after [`LONG_PATH`] events.
@@ -82,6 +84,10 @@ pub struct Start {
 }
 
 /// How the last vertex could also have found a light, for multiple importance sampling.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one stands on the stack per path; a box would allocate at every vertex"
+)]
 enum Rival<'m> {
     /// The path has just started: nothing else looks for lights from here.
     None,
@@ -97,7 +103,7 @@ enum Rival<'m> {
 }
 
 impl Rival<'_> {
-    /// Weight of finding `light` in direction `w_i` from `p` by the path's own sampling (balance heuristic).
+    /// Weight of finding `light` in direction `w_i` from `p` by the path's own sampling (power heuristic).
     fn weight<L: Lights>(&self, lights: &L, light: usize, p: Vec3, w_i: Vec3) -> f32 {
         let (own, other) = match self {
             Rival::None => return 1.0,
@@ -107,13 +113,20 @@ impl Rival<'_> {
         if other <= 0.0 {
             return 1.0;
         }
-        balance(own, other * lights.pdf(light, p, w_i))
+        power_heuristic(own, other * lights.pdf(light, p, w_i))
     }
 }
 
-fn balance(own: f32, other: f32) -> f32 {
+/// Power heuristic with exponent 2 (Veach and Guibas 1995): light sampling is much the better way to most lights here,
+/// and the square keeps the rare luckless hit from shining through.
+fn power_heuristic(own: f32, other: f32) -> f32 {
     // Infinite densities occur (a lamp on the ray); the other way then never loses.
-    if own.is_infinite() { 1.0 } else { own / (own + other) }
+    let ratio = other / own;
+    if own.is_infinite() {
+        1.0
+    } else {
+        1.0 / (1.0 + ratio * ratio)
+    }
 }
 
 /// Traces one path and tells `visitor` all light it finds.
@@ -189,8 +202,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
                 } else {
                     flight.pdf(t)
                 } * direction_pdf;
-                throughput *=
-                    flight.transmittance_to(t) * medium.scattering(w_o, w_i) / pdf;
+                throughput *= flight.transmittance_to(t) * medium.scattering(w_o, w_i) / pdf;
                 visitor.vertex(Vertex::Medium(x, &medium));
                 rival = lights.map_or(Rival::None, |lights| Rival::Segment { lights, t, pdf });
                 ray = Ray::new(x, w_i);
@@ -209,7 +221,15 @@ pub fn trace<'m, G: Geometry, L: Lights>(
                 let w = sampler.next_2d();
                 let share = if sigma > 0.0 { LAMP_SHARE_SURFACE } else { 0.0 };
                 let lamps = LampDirections::new(world.lights, hit.position, &choice, share, sigma);
-                lit_surface(world, hit, w_o, (&choice, &lamps), throughput, (u, w), visitor);
+                lit_surface(
+                    world,
+                    hit,
+                    w_o,
+                    (&choice, &lamps),
+                    throughput,
+                    (u, w),
+                    visitor,
+                );
                 let Some(w_i) = reflected_direction(hit, &lamps, w_o, lobe, direction) else {
                     return;
                 };
@@ -228,8 +248,12 @@ pub fn trace<'m, G: Geometry, L: Lights>(
             return;
         }
         if events > ROULETTE_AFTER {
-            let limit = if events > LONG_PATH { LONG_SURVIVAL } else { 1.0 };
-            let survival = strongest.clamp(SURVIVAL_MIN, limit);
+            let limit = if events > LONG_PATH {
+                LONG_SURVIVAL
+            } else {
+                1.0
+            };
+            let survival = (ROULETTE_GAIN * strongest).clamp(SURVIVAL_MIN, limit);
             if survival < 1.0 {
                 if sampler.next_1d() >= survival {
                     return;
@@ -271,7 +295,11 @@ fn seen_environment<G: Geometry, L: Lights>(
     for &light in world.lights.environment() {
         let radiance = world.lights.environment_radiance(light, ray.direction);
         let weight = rival.weight(world.lights, light, ray.origin, ray.direction);
-        visitor.light(throughput * radiance * weight, None, Source::Far(ray.direction));
+        visitor.light(
+            throughput * radiance * weight,
+            None,
+            Source::Far(ray.direction),
+        );
     }
 }
 
@@ -293,7 +321,7 @@ fn scattered_once<'m, G: Geometry, L: Lights>(
         let lamps = lamps_in_fog(world.lights, x, &s.medium);
         let w_o = -lights.ray().direction;
         let own = lights.flight().pdf(s.t) * direction_pdf(&s.medium, &lamps, w_o, s.light.w_i);
-        balance(s.pdf, own)
+        power_heuristic(s.pdf, own)
     };
     visitor.light(
         throughput * s.value * weight,
@@ -332,13 +360,17 @@ fn lit_surface<G: Geometry, L: Lights>(
     let weight = if s.delta {
         1.0
     } else {
-        balance(pdf, reflection_pdf(hit, lamps, w_o, s.w_i))
+        power_heuristic(pdf, reflection_pdf(hit, lamps, w_o, s.w_i))
     };
     visitor.light(value * arrives * weight, None, source(hit.position, &s));
 }
 
 /// The lamps as seen from a point in a medium.
-pub(crate) fn lamps_in_fog<L: Lights>(lights: &L, x: Vec3, medium: &MediumPoint<'_>) -> LampDirections {
+pub(crate) fn lamps_in_fog<L: Lights>(
+    lights: &L,
+    x: Vec3,
+    medium: &MediumPoint<'_>,
+) -> LampDirections {
     let sigma = mean(medium.sigma_t);
     let choice = LightChoice::at(lights, x, None, sigma);
     LampDirections::new(lights, x, &choice, LAMP_SHARE_MEDIUM, sigma)
@@ -349,12 +381,19 @@ fn mean(v: Vec3) -> f32 {
 }
 
 /// A direction by the phase function or around a lamp.
-fn scattered_direction(medium: &MediumPoint<'_>, lamps: &LampDirections, w_o: Vec3, u: [f32; 2]) -> Vec3 {
+fn scattered_direction(
+    medium: &MediumPoint<'_>,
+    lamps: &LampDirections,
+    w_o: Vec3,
+    u: [f32; 2],
+) -> Vec3 {
     if u[0] < lamps.share() {
         lamps.sample(u)
     } else {
         let rest = (u[0] - lamps.share()) / (1.0 - lamps.share());
-        medium.sample_phase(w_o, [rest.min(1.0 - f32::EPSILON), u[1]]).0
+        medium
+            .sample_phase(w_o, [rest.min(1.0 - f32::EPSILON), u[1]])
+            .0
     }
 }
 

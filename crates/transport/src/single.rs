@@ -61,7 +61,12 @@ impl<'m> SegmentLight<'m> {
         Some(Self {
             ray: *ray,
             flight: flight.clone(),
-            choice: LightChoice::along(world.lights, &from, length, depth / length.max(f32::MIN_POSITIVE)),
+            choice: LightChoice::along(
+                world.lights,
+                &from,
+                length,
+                depth / length.max(f32::MIN_POSITIVE),
+            ),
         })
     }
 
@@ -150,12 +155,21 @@ impl<'m> SegmentLight<'m> {
 const SHADOW_END: f32 = 1.0 - 1e-4;
 
 /// Transmittance to a light `distance` away along `ray`; `None` where a surface stands between.
-pub fn unoccluded<G: Geometry, L>(world: &World<'_, G, L>, ray: &Ray, distance: f32) -> Option<Vec3> {
+pub fn unoccluded<G: Geometry, L>(
+    world: &World<'_, G, L>,
+    ray: &Ray,
+    distance: f32,
+) -> Option<Vec3> {
     if world.geometry.occluded(ray, distance * SHADOW_END) {
         return None;
     }
     if world.media.is_empty() {
         return Some(Vec3::ONE);
     }
-    Some(world.media.optical_depth(ray, distance).map(|tau| (-tau).exp()))
+    Some(
+        world
+            .media
+            .optical_depth(ray, distance)
+            .map(|tau| (-tau).exp()),
+    )
 }

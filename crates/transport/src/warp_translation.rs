@@ -3,7 +3,7 @@
 //! When the gather point moves by δ, a vertex y of the path moves by α(y) δ with α = 1 at the gather point, falling to 0
 //! before the nearest surface, light or boundary of a medium. No term is singular, so the variance is finite.
 //!
-//! ∇∫f = ∫ f [ Σ_segments ∂ ln(T G) + Σ_vertices (α ∂ ln σs + ∂α) ],  α(y) = (1 − ρ²/D²)² for ρ = |y − x| < D, else 0.
+//! ∇∫f = ∫ f [ Σ over segments ∂ ln(T G) + Σ over vertices (α ∂ ln σs + ∂α) ],  α(y) = (1 − ρ²/D²)² for ρ = |y − x| < D, else 0.
 //!
 //! Derivation: change of variables y → y + α(y) δ in every medium vertex and the divergence theorem; there is no boundary
 //! term because α f vanishes where f jumps. With the vertices moving alike, the 1/r terms of neighbouring vertices cancel
@@ -76,8 +76,8 @@ impl<'m> WarpVisitor<'m> {
         }
         let tau = self.media.optical_depth_gradient(a.position, b.position);
         let geometry = geometry_log_gradient(a, b);
-        for c in 0..3 {
-            log_gradient[c] += geometry - tau.d_a[c] * a.alpha - tau.d_b[c] * b.alpha;
+        for (sum, (d_a, d_b)) in log_gradient.iter_mut().zip(tau.d_a.iter().zip(&tau.d_b)) {
+            *sum += geometry - *d_a * a.alpha - *d_b * b.alpha;
         }
     }
 
@@ -112,8 +112,8 @@ impl<'m> WarpVisitor<'m> {
     }
 }
 
-/// ∂ ln of cosθ_a cosθ_b / r² when the ends move by their α: with d the unit vector from a to b,
-/// (α_b − α_a) [ −2d + (n_a/cosθ_a − d) + (−n_b/cosθ_b − d) ] / r, the brackets in use only where an end lies on a surface.
+/// ∂ ln of cosθₐ cosθᵦ / r² when the ends move by their α: with d the unit vector from a to b,
+/// (αᵦ − αₐ) [ −2d + (nₐ/cosθₐ − d) + (−nᵦ/cosθᵦ − d) ] / r, the brackets in use only where an end lies on a surface.
 fn geometry_log_gradient(a: End, b: End) -> Vec3 {
     let offset = b.position - a.position;
     let r = offset.length();
@@ -162,9 +162,7 @@ impl Visitor for WarpVisitor<'_> {
             }
             Source::Far(w_i) if from.alpha > 0.0 => {
                 let ray = Ray::new(from.position, w_i);
-                let (_, tau) = self
-                    .media
-                    .optical_depth_gradient_rigid(&ray, f32::INFINITY);
+                let (_, tau) = self.media.optical_depth_gradient_rigid(&ray, f32::INFINITY);
                 for c in 0..3 {
                     log_gradient[c] -= tau[c] * from.alpha;
                 }

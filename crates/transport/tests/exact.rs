@@ -3,7 +3,10 @@
 //! Values: Sun et al. 2005 (airlight), Davison 1947 and Case and Zweifel 1967 (infinite medium), and integral equations
 //! for the sphere, computed to eight digits and more outside this project.
 #![allow(clippy::unwrap_used, reason = "tests")]
-#![allow(clippy::print_stdout, reason = "a failing table is easier to read whole")]
+#![allow(
+    clippy::print_stdout,
+    reason = "a failing table is easier to read whole"
+)]
 
 mod rig;
 
@@ -11,7 +14,9 @@ use glam::Vec3;
 use rig::{Estimate, Lamps, OPEN, Room, fog, pixel, sphere};
 use std::f32::consts::PI;
 use tyndall_math::{Key, Purpose, Ray};
-use tyndall_media::{Asymmetry, HenyeyGreenstein, Media, Medium, MediumParams, PhaseFunction, Region};
+use tyndall_media::{
+    Asymmetry, HenyeyGreenstein, Media, Medium, MediumParams, PhaseFunction, Region,
+};
 use tyndall_transport::{World, gather};
 
 fn hg(g: f32) -> PhaseFunction {
@@ -22,18 +27,71 @@ fn hg(g: f32) -> PhaseFunction {
 fn airlight_of_a_lamp_beside_the_ray_is_exact() {
     // σs, σt, t0, h, then isotropic, HG −0.5, 0.5, 0.9. The rows with a finite ray of 6 m differ from these by < 1e-5.
     let rows = [
-        (0.5, 1.0, 2.0, 1.0, [0.004466580927, 0.002171208651, 0.006069084823, 0.001848727281]),
-        (1.0, 1.0, 3.0, 2.0, [0.0007033791283, 0.0002724808992, 0.0009597241821, 0.000243616825]),
-        (0.5, 1.0, 2.0, 1e-3, [16.83526224, 23.60257898, 23.94972583, 107.749008]),
-        (0.5, 1.0, 2.0, 1e-6, [16916.75437, 23988.34788, 23989.12467, 108267.7866]),
-        (0.5, 1.0, -1.0, 0.75, [0.00243058488, 0.007696717608, 0.0005948031704, 7.506172204e-05]),
+        (
+            0.5,
+            1.0,
+            2.0,
+            1.0,
+            [
+                0.004466580927,
+                0.002171208651,
+                0.006069084823,
+                0.001848727281,
+            ],
+        ),
+        (
+            1.0,
+            1.0,
+            3.0,
+            2.0,
+            [
+                0.0007033791283,
+                0.0002724808992,
+                0.0009597241821,
+                0.000243616825,
+            ],
+        ),
+        (
+            0.5,
+            1.0,
+            2.0,
+            1e-3,
+            [16.83526224, 23.60257898, 23.94972583, 107.749008],
+        ),
+        (
+            0.5,
+            1.0,
+            2.0,
+            1e-6,
+            [16916.75437, 23988.34788, 23989.12467, 108267.7866],
+        ),
+        (
+            0.5,
+            1.0,
+            -1.0,
+            0.75,
+            [
+                0.00243058488,
+                0.007696717608,
+                0.0005948031704,
+                7.506172204e-05,
+            ],
+        ),
     ];
     for (sigma_s, sigma_t, t0, h, exact) in rows {
         // The lamp stands at the origin, where f32 resolves how close the ray passes.
         let lamps = Lamps::points(&[(Vec3::ZERO, 1.0)]);
         let ray = Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X);
-        for (phase, exact) in [PhaseFunction::Isotropic, hg(-0.5), hg(0.5), hg(0.9)].into_iter().zip(exact) {
-            let media = fog(sigma_t, sigma_s / sigma_t, Region::Everywhere, phase.clone());
+        for (phase, exact) in [PhaseFunction::Isotropic, hg(-0.5), hg(0.5), hg(0.9)]
+            .into_iter()
+            .zip(exact)
+        {
+            let media = fog(
+                sigma_t,
+                sigma_s / sigma_t,
+                Region::Everywhere,
+                phase,
+            );
             let world = World {
                 geometry: &OPEN,
                 lights: &lamps,
@@ -62,8 +120,18 @@ fn all_orders_beside_a_lamp_in_endless_fog_are_exact() {
             lights: &lamps,
             media: &media,
         };
-        let (_, estimate) = pixel(&world, Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X), None, 400_000);
-        estimate.check(&format!("pixel c {albedo} t0 {t0} h {h}"), exact, 5e-3, 1e-4);
+        let (_, estimate) = pixel(
+            &world,
+            Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X),
+            None,
+            400_000,
+        );
+        estimate.check(
+            &format!("pixel c {albedo} t0 {t0} h {h}"),
+            exact,
+            5e-3,
+            1e-4,
+        );
     }
 }
 
@@ -103,7 +171,7 @@ fn a_white_furnace_shows_one_everywhere() {
         let media = Media::new(vec![
             Medium::new(MediumParams {
                 region: sphere(1.0),
-                phase: phase.clone(),
+                phase,
                 ..MediumParams::new(sigma, Vec3::ONE)
             })
             .unwrap(),
@@ -142,7 +210,12 @@ fn an_isothermal_furnace_shows_its_temperature() {
         lights: &lamps,
         media: &media,
     };
-    let (_, estimate) = pixel(&world, Ray::new(Vec3::new(0.9, 0.9, 0.0), Vec3::NEG_X), None, 200_000);
+    let (_, estimate) = pixel(
+        &world,
+        Ray::new(Vec3::new(0.9, 0.9, 0.0), Vec3::NEG_X),
+        None,
+        200_000,
+    );
     estimate.check("isothermal", 1.0, 3e-3, 1e-5);
 }
 
@@ -172,14 +245,30 @@ fn a_closed_room_with_fog_and_a_lamp_is_exact() {
             let x = -(1.0 - impact * impact).sqrt() * radius * 0.9999;
             let ray = Ray::new(Vec3::new(x, impact * radius * 0.9999, 0.0), Vec3::X);
             let (_, estimate) = pixel(&world, ray, None, 300_000);
-            estimate.check(&format!("room R {radius} c {albedo} b {impact}"), exact, 6e-3, 3e-4);
+            estimate.check(
+                &format!("room R {radius} c {albedo} b {impact}"),
+                exact,
+                6e-3,
+                3e-4,
+            );
         }
     }
 }
 
 /// Checks value and radial gradient of fresh records against fluence and its derivative.
-fn check_record(name: &str, world: &World<'_, Room, Lamps>, x: Vec3, value: f64, slope: f64, worst: [f64; 2]) {
-    let (mut values, mut slopes, mut across) = (Estimate::default(), Estimate::default(), Estimate::default());
+fn check_record(
+    name: &str,
+    world: &World<'_, Room, Lamps>,
+    x: Vec3,
+    value: f64,
+    slope: f64,
+    worst: [f64; 2],
+) {
+    let (mut values, mut slopes, mut across) = (
+        Estimate::default(),
+        Estimate::default(),
+        Estimate::default(),
+    );
     for i in 0..64 {
         let key = Key {
             seed: 5,
@@ -196,8 +285,15 @@ fn check_record(name: &str, world: &World<'_, Room, Lamps>, x: Vec3, value: f64,
     let f = 0.25 / f64::from(PI);
     values.check(&format!("{name} value"), value * f, worst[0], 1e-4);
     slopes.check(&format!("{name} gradient"), slope * f, worst[1], 1e-3);
-    println!("  across: {:.3e} ± {:.1e}", across.mean() - slope, across.error());
-    assert!((across.mean() - slope).abs() < 4.5 * across.error() + 1e-6 * slope.abs(), "{name}: sideways gradient");
+    println!(
+        "  across: {:.3e} ± {:.1e}",
+        across.mean() - slope,
+        across.error()
+    );
+    assert!(
+        (across.mean() - slope).abs() < 4.5 * across.error() + 1e-6 * slope.abs(),
+        "{name}: sideways gradient"
+    );
 }
 
 #[test]
@@ -219,7 +315,14 @@ fn records_in_endless_fog_have_the_exact_value_and_gradient() {
             media: &media,
         };
         let x = Vec3::new(0.6, -0.48, 0.64) * r as f32;
-        check_record(&format!("fog c {albedo} r {r}"), &world, x, phi, slope - uncollided(r), [0.01, 0.05]);
+        check_record(
+            &format!("fog c {albedo} r {r}"),
+            &world,
+            x,
+            phi,
+            slope - uncollided(r),
+            [0.01, 0.05],
+        );
     }
 }
 

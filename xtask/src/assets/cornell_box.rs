@@ -37,7 +37,7 @@ pub(super) fn asset() -> Asset {
     let white = document.lambertian("white", [0.73, 0.73, 0.73]);
     let red = document.lambertian("red", [0.63, 0.065, 0.05]);
     let green = document.lambertian("green", [0.14, 0.45, 0.091]);
-    let lamp = document.emitter("lamp", [1.0, 0.78, 0.5], 30.0);
+    let lamp = document.emitter("lamp", [1.0, 0.76, 0.46], 130.0);
 
     let mut room = Mesh::default();
     room.polygon(&CEILING.map(|p| point(p, HEIGHT)));

@@ -19,10 +19,11 @@ Scene(
         Medium(
             name: "fog",
             region: Box(min: (-5.3, -0.3, -10.3), max: (5.3, 6.8, 10.3)),
-            sigma_t: (0.04, 0.04, 0.04),
+            sigma_t: (0.06, 0.06, 0.06),
             albedo: (0.95, 0.95, 0.95),
         ),
     ],
+    render: Render(exposure: 0.5),
 )
 "#;
 

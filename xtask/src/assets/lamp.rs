@@ -4,10 +4,10 @@ use super::Asset;
 
 const RON: &str = r#"// A lamp in fog that fills all space: its glow is scattered light alone.
 Scene(
-    camera: LookAt(eye: (0.0, 0.0, 4.0), target: (0.0, 0.0, 0.0), vfov: 45.0),
+    camera: LookAt(eye: (0.0, 0.0, 6.0), target: (0.0, 0.0, 0.0), vfov: 60.0),
     film: Film(width: 512, height: 384),
     lights: [
-        Point(position: (0.0, 0.0, 0.0), intensity: (8.0, 6.4, 4.0)),
+        Point(position: (0.0, 0.0, 0.0), intensity: (20.0, 15.0, 8.0)),
     ],
     media: [
         Medium(

@@ -8,7 +8,7 @@ use glam::{Quat, Vec3};
 const RON: &str = r#"// A long street at night in fog: 40 lamps, and a car with headlights and tail lights.
 Scene(
     gltf: "street.gltf",
-    camera: LookAt(eye: (-3.4, 2.1, 6.0), target: (0.2, 2.2, -12.0), vfov: 48.0),
+    camera: LookAt(eye: (-2.5, 2.1, 6.5), target: (0.2, 2.2, -12.0), vfov: 48.0),
     film: Film(width: 640, height: 480),
     lights: [
         Sky(radiance: (0.004, 0.006, 0.011)),
@@ -17,7 +17,7 @@ Scene(
         Medium(
             name: "fog",
             region: Box(min: (-25.0, -0.5, -140.0), max: (25.0, 14.0, 20.0)),
-            sigma_t: (0.035, 0.035, 0.035),
+            sigma_t: (0.03, 0.03, 0.03),
             albedo: (0.95, 0.95, 0.95),
         ),
     ],
@@ -134,7 +134,7 @@ fn lamps(document: &mut Document) {
     post.cuboid([-0.25, 0.15, -0.15], [0.25, 0.25, 0.15]);
     let content = Content {
         mesh: Some(document.mesh("lamp post", &[(&post, iron)])),
-        light: Some(document.point_light("street lamp", 30.0, [1.0, 0.68, 0.36])),
+        light: Some(document.point_light("street lamp", 24.0, [1.0, 0.68, 0.36])),
     };
     for i in 0..20 {
         for (side, x, turn) in [

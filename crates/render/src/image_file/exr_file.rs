@@ -1,4 +1,4 @@
-//! OpenEXR: 32-bit float, one part, one window in the frame.
+//! EXR: 32-bit float, one part, one window in the frame.
 //!
 //! Layers are groups of channels with dotted names, which every reader understands; metadata are one string attribute, since several
 //! would be written in a random order.
@@ -60,7 +60,7 @@ pub(super) fn write(
     image.write().to_buffered(file).map_err(|e| e.to_string())
 }
 
-/// Whether a file starts as OpenEXR files do.
+/// Whether a file starts as EXR files do.
 pub(super) fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }

@@ -120,7 +120,13 @@ impl<'s> Camera<'s> {
     }
 
     /// A sample of pixel (x, y) with multiple scattering found as `multiple` says.
-    pub(crate) fn cached(&self, x: u32, y: u32, sampler: &mut Sampler, multiple: &Multiple<'_>) -> Pixel {
+    pub(crate) fn cached(
+        &self,
+        x: u32,
+        y: u32,
+        sampler: &mut Sampler,
+        multiple: &Multiple<'_>,
+    ) -> Pixel {
         let world = self.geometry.world(self.scene);
         let ray = self.ray(x, y, sampler);
         let hit = world.geometry.intersect(&ray, f32::INFINITY);
@@ -149,7 +155,7 @@ impl<'s> Camera<'s> {
             match multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    let (value, records) = self.from_records(&ray, &flight, cache, sampler);
+                    let (value, records) = self.interpolated(&ray, &flight, cache, sampler);
                     pixel.multiple = value;
                     pixel.records = records;
                 }
@@ -175,7 +181,12 @@ impl<'s> Camera<'s> {
             max_depth: self.max_depth,
         };
         let mut visitor = LayerVisitor::default();
-        trace(&self.geometry.world(self.scene), &start, sampler, &mut visitor);
+        trace(
+            &self.geometry.world(self.scene),
+            &start,
+            sampler,
+            &mut visitor,
+        );
         visitor.layers
     }
 
@@ -202,7 +213,7 @@ impl<'s> Camera<'s> {
         sum / SINGLE_SAMPLES as f32
     }
 
-    fn from_records(
+    fn interpolated(
         &self,
         ray: &Ray,
         flight: &FreeFlight<'_>,
@@ -214,7 +225,8 @@ impl<'s> Camera<'s> {
         let mut sum = Vec3::ZERO;
         let (mut looked, mut missed) = (0, 0);
         for i in 0..MULTIPLE_SAMPLES {
-            let Some(t) = flight.sample_inside((i as f32 + offset) / MULTIPLE_SAMPLES as f32) else {
+            let Some(t) = flight.sample_inside((i as f32 + offset) / MULTIPLE_SAMPLES as f32)
+            else {
                 continue;
             };
             let x = ray.at(t);

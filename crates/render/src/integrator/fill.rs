@@ -80,12 +80,17 @@ impl Fill<'_> {
                     })
                     .collect();
                 rays += computed.iter().map(|(_, n)| n).sum::<u64>();
-                let records = computed.into_iter().filter_map(|(record, _)| record).collect();
-                if cache.insert(records).is_err() {
-                    debug_assert!(false, "a computed record is not valid");
+                let records = computed
+                    .into_iter()
+                    .filter_map(|(record, _)| record)
+                    .collect();
+                let kept = cache
+                    .insert(records)
+                    .and_then(|()| cache.clamp_radii(RADIUS_SLOPE));
+                debug_assert!(kept.is_ok(), "{kept:?}");
+                if kept.is_err() {
                     break;
                 }
-                cache.clamp_radii(RADIUS_SLOPE);
             }
         }
         (cache, rays)
@@ -109,7 +114,10 @@ impl Fill<'_> {
             for i in 0..8 {
                 let (x, y) = ((i as f32 + 0.5) / 8.0, (j as f32 + 0.5) / 8.0);
                 let ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
-                let t_max = world.geometry.intersect(&ray, f32::INFINITY).map_or(f32::INFINITY, |h| h.t);
+                let t_max = world
+                    .geometry
+                    .intersect(&ray, f32::INFINITY)
+                    .map_or(f32::INFINITY, |h| h.t);
                 let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
                 if flight.can_stop() {
                     let start = flight.segment().range().0;
@@ -132,7 +140,7 @@ impl Fill<'_> {
             .map(|&y| {
                 let mut row = Vec::new();
                 for x in (0..w).step_by(stride as usize) {
-                    let index = level << 40 | u64::from(y) * u64::from(w) + u64::from(x);
+                    let index = (level << 40) | (u64::from(y) * u64::from(w) + u64::from(x));
                     let key = Key {
                         seed: self.seed,
                         purpose: Purpose::Placement,
@@ -160,7 +168,10 @@ impl Fill<'_> {
 
     fn points_on(&self, ray: &Ray, offset: f32, mut visit: impl FnMut(Candidate)) {
         let world = self.scene.world();
-        let t_max = world.geometry.intersect(ray, f32::INFINITY).map_or(f32::INFINITY, |h| h.t);
+        let t_max = world
+            .geometry
+            .intersect(ray, f32::INFINITY)
+            .map_or(f32::INFINITY, |h| h.t);
         let flight = FreeFlight::new(world.media.segment(ray, t_max), Vec3::ONE);
         if !flight.can_stop() {
             return;
@@ -176,7 +187,13 @@ impl Fill<'_> {
     }
 
     /// The record at a point; `None` where it would not be finite.
-    fn record(&self, geometry: &Counted<'_>, point: &Candidate, index: u64, scale: f32) -> Option<Record<3>> {
+    fn record(
+        &self,
+        geometry: &Counted<'_>,
+        point: &Candidate,
+        index: u64,
+        scale: f32,
+    ) -> Option<Record<3>> {
         let world = geometry.world(self.scene);
         let x = point.position;
         let key = Key {
@@ -211,7 +228,8 @@ impl Fill<'_> {
 /// Drops candidates that an earlier one will probably cover; keeps their order.
 fn thin(candidates: &[Candidate], cache: &Cache<3>, scale: f32) -> Vec<Candidate> {
     let cell = RADIUS_RANGE[1] * scale;
-    let mut grid: std::collections::HashMap<[i32; 3], Vec<(Vec3, f32)>> = std::collections::HashMap::new();
+    let mut grid: std::collections::HashMap<[i32; 3], Vec<(Vec3, f32)>> =
+        std::collections::HashMap::new();
     let mut kept = Vec::new();
     for c in candidates {
         let mut radius = RADIUS_RANGE[1] * scale;
@@ -228,7 +246,9 @@ fn thin(candidates: &[Candidate], cache: &Cache<3>, scale: f32) -> Vec<Candidate
                         key[2].wrapping_add(dz),
                     ];
                     grid.get(&near).is_some_and(|points| {
-                        points.iter().any(|&(p, r)| p.distance(c.position) < SPACING * r.min(radius))
+                        points
+                            .iter()
+                            .any(|&(p, r)| p.distance(c.position) < SPACING * r.min(radius))
                     })
                 })
             })

@@ -50,7 +50,11 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Options out of range, a crop outside the frame, or threads that cannot be started.
-pub fn render(scene: &Scene, options: &RenderOptions, progress: &dyn Progress) -> Result<Outcome, RenderError> {
+pub fn render(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Outcome, RenderError> {
     options.check()?;
     let frame = options.frame([scene.film.width, scene.film.height]);
     let crop = options.crop.unwrap_or(Crop::whole(frame)).within(frame)?;
@@ -117,7 +121,11 @@ impl<'s> Run<'s> {
     fn render(&self) -> Outcome {
         let mut notes = Vec::new();
         let mut stats = Stats::default();
-        let layers = self.options.layers.clone().unwrap_or_else(|| LayerSet::usual(self.scene.media.emits()));
+        let layers = self
+            .options
+            .layers
+            .clone()
+            .unwrap_or_else(|| LayerSet::usual(self.scene.media.emits()));
         let mut film = Film::new(self.frame, self.crop, layers);
 
         let way = self.way(&mut notes);
@@ -125,7 +133,9 @@ impl<'s> Run<'s> {
             Way::Records => {
                 let (cache, rays) = self.fill();
                 stats.rays += rays;
-                stats.records.insert("multiple".to_owned(), cache.len() as u64);
+                stats
+                    .records
+                    .insert("multiple".to_owned(), cache.len() as u64);
                 Some(cache)
             }
             _ => None,
@@ -154,8 +164,13 @@ impl<'s> Run<'s> {
         let found = match way {
             Way::PathIntegrator => "integrator: path".to_owned(),
             Way::NoMultiple => "records: none; single: direct; SH: off".to_owned(),
-            Way::Records => format!("records: {} multiple; single: direct; SH: off", stats.records["multiple"]),
-            Way::Paths => "records: none, multiple scattering path traced; single: direct; SH: off".to_owned(),
+            Way::Records => format!(
+                "records: {} multiple; single: direct; SH: off",
+                stats.records["multiple"]
+            ),
+            Way::Paths => {
+                "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
+            }
         };
         Outcome {
             image: film.image(),
@@ -270,8 +285,13 @@ impl<'s> Run<'s> {
         (sum, complete)
     }
 
-    fn row(&self, row: &mut FilmRow<'_>, samples: std::ops::Range<u32>, multiple: &Multiple<'_>) -> Tally {
-        let mut camera = Camera::new(self.scene, self.frame, self.max_depth);
+    fn row(
+        &self,
+        row: &mut FilmRow<'_>,
+        samples: std::ops::Range<u32>,
+        multiple: &Multiple<'_>,
+    ) -> Tally {
+        let camera = Camera::new(self.scene, self.frame, self.max_depth);
         for x in row.columns() {
             let pixel = u64::from(row.y) * u64::from(self.frame[0]) + u64::from(x);
             for sample in samples.clone() {

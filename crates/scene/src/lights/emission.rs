@@ -10,7 +10,7 @@ use std::sync::Arc;
 pub enum Emission {
     /// The same everywhere, W/(m² sr).
     Constant(Vec3),
-    /// By the emissive texture of a triangle of the mesh.
+    /// By the textures of a triangle of the mesh: what emits, and where there are holes.
     Textured {
         /// Mesh, materials and textures.
         surfaces: Arc<Surfaces>,
@@ -28,7 +28,7 @@ impl Emission {
         if !material.is_emissive() {
             return None;
         }
-        if material.emissive_texture.is_none() {
+        if material.emissive_texture.is_none() && material.alpha_cutoff.is_none() {
             return Some(Self::Constant(material.emissive));
         }
         let n = lattice_size(surfaces, triangle);
@@ -86,11 +86,14 @@ impl Emission {
 }
 
 fn radiance(surfaces: &Surfaces, triangle: u32, b: Vec3) -> Vec3 {
-    let uv = surfaces.mesh.uv(triangle as usize, b);
+    let Surfaces { mesh, textures, .. } = surfaces;
+    let material = surfaces.material(triangle);
+    let uv = mesh.uv(triangle as usize, b);
+    if material.is_hole(textures, uv, mesh.color(triangle as usize, b)) {
+        return Vec3::ZERO;
+    }
     // Whether the other side emits too is the light's affair.
-    surfaces
-        .material(triangle)
-        .emission(&surfaces.textures, uv, true)
+    material.emission(textures, uv, true)
 }
 
 /// Most sub-triangles along an edge at which a texture is looked at.
@@ -99,18 +102,18 @@ const LARGEST_LATTICE: usize = 64;
 /// Sub-triangles along an edge such that two stand on every texel, within bounds.
 fn lattice_size(surfaces: &Surfaces, triangle: u32) -> usize {
     let material = surfaces.material(triangle);
-    let Some(map) = &material.emissive_texture else {
-        return 1;
-    };
-    let (width, height) = surfaces.textures[map.texture as usize].size();
-    let texels = Vec2::new(width as f32, height as f32);
-    let [a, b, c] = [Vec3::X, Vec3::Y, Vec3::Z].map(|corner| {
-        let uv = surfaces.mesh.uv(triangle as usize, corner);
-        map.transform * uv[map.tex_coord] * texels
+    let maps = [&material.emissive_texture, &material.base_color_texture];
+    let longest = maps.into_iter().flatten().map(|map| {
+        let (width, height) = surfaces.textures[map.texture as usize].size();
+        let texels = Vec2::new(width as f32, height as f32);
+        let [a, b, c] = [Vec3::X, Vec3::Y, Vec3::Z].map(|corner| {
+            let uv = surfaces.mesh.uv(triangle as usize, corner);
+            map.transform * uv[map.tex_coord] * texels
+        });
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
     });
-    let longest = (a - b).length().max((b - c).length()).max((c - a).length());
     // A cast from a float saturates, and NaN becomes 0.
-    ((2.0 * longest).ceil() as usize).clamp(4, LARGEST_LATTICE)
+    ((2.0 * longest.fold(0.0, f32::max)).ceil() as usize).clamp(4, LARGEST_LATTICE)
 }
 
 /// Barycentric centres of the n² equal sub-triangles of a triangle.

@@ -3,7 +3,8 @@
 //! Two triangles that make up a rectangle of one colour become one light, which is sampled better than its halves.
 
 use super::{Emission, Light, QuadLight, TriangleLight};
-use crate::triangles::{Surfaces, geometric_normal};
+use crate::hierarchy::geometric_normal;
+use crate::triangles::Surfaces;
 use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::Arc;

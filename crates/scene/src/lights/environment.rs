@@ -1,11 +1,11 @@
 //! Light from all directions by an equirectangular image.
 //!
-//! Sampling follows the image: cells of the sphere, one per texel, in proportion to the light they send.
+//! Sampling follows the image: texels in proportion to the light they send, and between them as the light varies.
 
 use super::mean;
 use super::sky::surface_share;
-use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, TAU};
+use glam::{DVec3, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use tyndall_math::{Distribution2D, Ray};
 use tyndall_transport::LightSample;
 
@@ -44,37 +44,37 @@ impl EnvironmentImage {
         (self.width, self.height)
     }
 
-    fn texel(&self, x: usize, y: usize) -> Vec3 {
-        self.texels[y * self.width + x]
-    }
-
-    /// Radiance at (u, v) in [0, 1]², bilinear between texel centres; u wraps around, v ends at the poles.
-    fn lookup(&self, u: f32, v: f32) -> Vec3 {
+    /// The four texels around (u, v) in [0, 1]²; columns wrap around, rows end at the poles.
+    fn around(&self, u: f32, v: f32) -> Around {
         let x = u * self.width as f32 - 0.5;
         let y = v * self.height as f32 - 0.5;
         let (x0, y0) = (x.floor(), y.floor());
         let column = |x: f32| (x as i64).rem_euclid(self.width as i64) as usize;
         let row = |y: f32| (y as i64).clamp(0, self.height as i64 - 1) as usize;
-        let (left, right) = (column(x0), column(x0 + 1.0));
-        let along = |y: usize| self.texel(left, y).lerp(self.texel(right, y), x - x0);
-        along(row(y0)).lerp(along(row(y0 + 1.0)), y - y0)
-    }
-
-    /// Mean of the bilinear function over the cell of a texel.
-    ///
-    /// A cell reaches half a texel to either side of its texel's centre, so the neighbours on either side weigh 1/8 and the
-    /// texel itself 6/8, in both directions. It is 0 only where the whole cell is black.
-    fn cell(&self, x: usize, y: usize) -> Vec3 {
-        let columns = [(x + self.width - 1) % self.width, x, (x + 1) % self.width];
-        let rows = [y.saturating_sub(1), y, (y + 1).min(self.height - 1)];
-        let weights = [0.125, 0.75, 0.125];
-        let mut sum = Vec3::ZERO;
-        for (row, row_weight) in rows.into_iter().zip(weights) {
-            for (column, weight) in columns.into_iter().zip(weights) {
-                sum += self.texel(column, row) * (weight * row_weight);
-            }
+        let columns = [column(x0), column(x0 + 1.0)];
+        let rows = [row(y0), row(y0 + 1.0)];
+        Around {
+            rows,
+            texels: rows.map(|row| columns.map(|x| self.texels[row * self.width + x])),
+            within: [x - x0, y - y0],
         }
-        sum
+    }
+}
+
+/// Four texels around a point, and the point's place between them.
+struct Around {
+    rows: [usize; 2],
+    texels: [[Vec3; 2]; 2],
+    within: [f32; 2],
+}
+
+impl Around {
+    /// Bilinear interpolation of the texels, each row multiplied by a factor of its own.
+    fn interpolate(&self, row_factor: impl Fn(usize) -> f32) -> Vec3 {
+        let [x, y] = self.within;
+        let [top, bottom] =
+            [0, 1].map(|i| self.texels[i][0].lerp(self.texels[i][1], x) * row_factor(self.rows[i]));
+        top.lerp(bottom, y)
     }
 }
 
@@ -85,19 +85,17 @@ impl EnvironmentImage {
 ///
 /// u = 1/2 + (φ + rotation)/2π,  v = θ/π.
 ///
-/// Directions are sampled by cell, one per texel: a cell with probability ∝ its mean radiance × its solid angle
-/// ΔφΔcosθ, and within it uniformly in φ and cosθ. The density on the sphere is then constant over each cell, without
-/// poles.
+/// Radiance is bilinear between texel centres, that is, a sum of tents over the texels. So is the density in (u, v): a
+/// texel is picked in proportion to its sum of channels × the solid angle of its row, then a point under its tent.
+/// Radiance over density is then the same everywhere, but for colour and the change of sinθ within a row.
 #[derive(Clone, Debug)]
 pub struct EnvironmentLight {
     image: EnvironmentImage,
     /// Radians, counter-clockwise seen from above.
     rotation: f32,
     /// `None` where the image is black.
-    cells: Option<Distribution2D>,
-    /// cosθ of the edges between rows; in f64, because close to the poles neighbours differ by 1/height² and less.
-    row_cosines: Vec<f64>,
-    /// 1 / solid angle of a cell in each row.
+    texels: Option<Distribution2D>,
+    /// Density over (u, v) of a texel with channels that sum to 1, for each row.
     row_densities: Vec<f32>,
     fluence: Vec3,
 }
@@ -110,23 +108,27 @@ impl EnvironmentLight {
             *texel = (*texel * scale).min(Vec3::splat(BRIGHTEST));
         }
         let (width, height) = image.size();
-        let cosine = |row: usize| (std::f64::consts::PI * row as f64 / height as f64).cos();
-        let solid_angle =
-            |row: usize| std::f64::consts::TAU / width as f64 * (cosine(row) - cosine(row + 1));
-        let mut fluence = glam::DVec3::ZERO;
-        let mut weights = Vec::with_capacity(width * height);
-        for y in 0..height {
-            for x in 0..width {
-                let light = image.cell(x, y).as_dvec3() * solid_angle(y);
+        // ΔφΔcosθ, in which the difference of cosines is 2 sin θ sin(Δθ/2) at the middle of the row.
+        let row_angle = std::f64::consts::PI / height as f64;
+        let solid_angle = |row: usize| {
+            let theta = row_angle * (row as f64 + 0.5);
+            std::f64::consts::TAU / width as f64 * 2.0 * theta.sin() * (0.5 * row_angle).sin()
+        };
+        let mut fluence = DVec3::ZERO;
+        let mut weights = Vec::with_capacity(image.texels.len());
+        for (y, row) in image.texels.chunks(width).enumerate() {
+            for texel in row {
+                let light = texel.as_dvec3() * solid_angle(y);
                 fluence += light;
                 weights.push(light.element_sum() as f32);
             }
         }
+        let n_texels = image.texels.len() as f64;
+        let total = fluence.element_sum();
         Self {
-            cells: Distribution2D::new(&weights, width),
-            row_cosines: (0..=height).map(cosine).collect(),
+            texels: Distribution2D::new(&weights, width),
             row_densities: (0..height)
-                .map(|row| (1.0 / solid_angle(row)) as f32)
+                .map(|row| (n_texels * solid_angle(row) / total) as f32)
                 .collect(),
             image,
             rotation,
@@ -147,7 +149,7 @@ impl EnvironmentLight {
     /// Radiance from direction `w_i`, W/(m² sr).
     pub fn radiance(&self, w_i: Vec3) -> Vec3 {
         let [u, v] = self.image_from_direction(w_i);
-        self.image.lookup(u, v)
+        self.image.around(u, v).interpolate(|_| 1.0)
     }
 
     pub(super) fn importance(&self, _p: Vec3, normal: Option<Vec3>) -> f32 {
@@ -159,14 +161,14 @@ impl EnvironmentLight {
     }
 
     pub(super) fn sample(&self, _p: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let ([u, v], _) = self.cells.as_ref()?.sample(u);
-        let row = self.row(v);
-        let within = f64::from(v) * self.image.height as f64 - row as f64;
-        let (above, below) = (self.row_cosines[row], self.row_cosines[row + 1]);
-        let cos_theta = above + (below - above) * within;
-        let w_i = self.direction_from_image(u, cos_theta);
+        let ([x, y], _) = self.texels.as_ref()?.sample(u);
+        let u = under_tent(x, self.image.width);
+        // A tent that reaches beyond a pole is folded back, as rows beyond it repeat the last.
+        let v = under_tent(y, self.image.height).abs();
+        let v = 1.0 - (1.0 - v).abs();
+        let w_i = self.direction_from_image(u, v);
         let pdf = self.pdf(w_i);
-        (pdf > 0.0).then(|| LightSample {
+        (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             w_i,
             distance: f32::INFINITY,
             radiance: self.radiance(w_i),
@@ -177,17 +179,17 @@ impl EnvironmentLight {
     }
 
     pub(super) fn pdf(&self, w_i: Vec3) -> f32 {
-        let Some(cells) = &self.cells else {
+        if self.texels.is_none() {
             return 0.0;
-        };
+        }
         let [u, v] = self.image_from_direction(w_i);
-        // The distribution's density is over the unit square, in which a cell covers 1 / (width height).
-        let n_cells = (self.image.width * self.image.height) as f32;
-        cells.pdf([u, v]) / n_cells * self.row_densities[self.row(v)]
-    }
-
-    fn row(&self, v: f32) -> usize {
-        ((v * self.image.height as f32) as usize).min(self.image.height - 1)
+        let density = self
+            .image
+            .around(u, v)
+            .interpolate(|row| self.row_densities[row])
+            .element_sum();
+        // dω = 2π² sinθ du dv.
+        density / (2.0 * PI * PI * w_i.x.hypot(w_i.z))
     }
 
     fn image_from_direction(&self, w: Vec3) -> [f32; 2] {
@@ -198,10 +200,23 @@ impl EnvironmentLight {
         [if u < 1.0 { u } else { 0.0 }, theta * FRAC_1_PI]
     }
 
-    fn direction_from_image(&self, u: f32, cos_theta: f64) -> Vec3 {
-        let phi = (u - 0.5) * TAU - self.rotation;
-        let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt() as f32;
-        let (sin_phi, cos_phi) = phi.sin_cos();
-        Vec3::new(sin_theta * sin_phi, cos_theta as f32, -sin_theta * cos_phi)
+    fn direction_from_image(&self, u: f32, v: f32) -> Vec3 {
+        let (sin_phi, cos_phi) = ((u - 0.5) * TAU - self.rotation).sin_cos();
+        let (sin_theta, cos_theta) = (v * PI).sin_cos();
+        Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
     }
+}
+
+/// Moves `x` in [0, 1), even over one of `n` cells, to a point under the tent that reaches one cell to either side of the
+/// cell's centre.
+fn under_tent(x: f32, n: usize) -> f32 {
+    let x = f64::from(x) * n as f64;
+    let cell = x.floor();
+    let within = x - cell;
+    let offset = if within < 0.5 {
+        (2.0 * within).sqrt() - 1.0
+    } else {
+        1.0 - (2.0 * (1.0 - within)).sqrt()
+    };
+    ((cell + 0.5 + offset) / n as f64) as f32
 }

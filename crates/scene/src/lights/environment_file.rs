@@ -1,4 +1,4 @@
-//! Reading environment images: OpenEXR and Radiance HDR.
+//! Reading environment images: `OpenEXR` and Radiance HDR.
 //!
 //! A file is distrusted: sizes are checked before memory is asked for, and every texel before it is believed.
 
@@ -10,6 +10,11 @@ use std::path::{Path, PathBuf};
 
 /// Texels of the largest image that is read: 16384 × 8192.
 const MAX_TEXELS: u64 = 1 << 27;
+
+/// Texels that a byte of a file may stand for, beyond what is harmless: no codec packs real images a hundredth as tightly.
+const TEXELS_PER_BYTE: u64 = 4096;
+/// Texels that any file may claim: 48 MiB in memory.
+const HARMLESS_TEXELS: u64 = 1 << 22;
 
 /// Why an environment image cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -24,7 +29,7 @@ pub enum EnvironmentError {
         path: PathBuf,
     },
 
-    /// The file is neither OpenEXR nor Radiance HDR.
+    /// The file is neither `OpenEXR` nor Radiance HDR.
     #[error(
         "an environment image is an OpenEXR (.exr) or Radiance (.hdr) file, and this is neither by its first bytes; convert it, \
          for example with oiiotool or ImageMagick ({})",
@@ -59,6 +64,23 @@ pub enum EnvironmentError {
         path: PathBuf,
     },
 
+    /// The image claims a size that its bytes cannot fill.
+    #[error(
+        "the environment image claims {width} x {height} texels but the file has only {bytes} bytes; it is broken or cut off \
+         ({})",
+        path.display()
+    )]
+    Implausible {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// Size of the file.
+        bytes: u64,
+        /// The file.
+        path: PathBuf,
+    },
+
     /// Some texels are not numbers, or infinite.
     #[error(
         "{count} texels of the environment image are infinite or not a number, the first in column {column}, row {row} (from \
@@ -79,7 +101,7 @@ pub enum EnvironmentError {
 
 /// Reads an equirectangular image of radiance; also says how many texels were negative and became 0.
 ///
-/// OpenEXR: the first part with channels R, G and B, placed in the display window, which lossy compression may have given
+/// `OpenEXR`: the first part with channels R, G and B, placed in the display window, which lossy compression may have given
 /// small negative values. Radiance HDR: as it stands, without its exposure.
 ///
 /// # Errors
@@ -92,10 +114,11 @@ pub fn read_environment(path: &Path) -> Result<(EnvironmentImage, usize), Enviro
     let mut file = BufReader::new(File::open(path).map_err(read_error)?);
     let mut magic = [0; 4];
     let n_bytes = read_up_to(&mut file, &mut magic).map_err(read_error)?;
+    let bytes = file.seek(SeekFrom::End(0)).map_err(read_error)?;
     file.seek(SeekFrom::Start(0)).map_err(read_error)?;
     let (width, height, mut texels) = match &magic[..n_bytes] {
-        [0x76, 0x2f, 0x31, 0x01] => read_exr(file, path)?,
-        [b'#', b'?', ..] => read_hdr(file, path)?,
+        [0x76, 0x2f, 0x31, 0x01] => read_exr(file, bytes, path)?,
+        [b'#', b'?', ..] => read_hdr(file, bytes, path)?,
         _ => return Err(EnvironmentError::UnknownFormat { path: path.into() }),
     };
     let is_bad = |texel: &Vec3| !texel.is_finite();
@@ -136,11 +159,21 @@ fn read_up_to(file: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize>
 
 type Texels = (usize, usize, Vec<Vec3>);
 
-fn check_size(width: u64, height: u64, path: &Path) -> Result<(), EnvironmentError> {
-    if width.saturating_mul(height) > MAX_TEXELS {
+/// Refuses sizes beyond [`MAX_TEXELS`], and those that a file of so many `bytes` cannot fill.
+fn check_size(width: u64, height: u64, bytes: u64, path: &Path) -> Result<(), EnvironmentError> {
+    let n_texels = width.saturating_mul(height);
+    if n_texels > MAX_TEXELS {
         return Err(EnvironmentError::TooLarge {
             width,
             height,
+            path: path.into(),
+        });
+    }
+    if n_texels > HARMLESS_TEXELS + bytes.saturating_mul(TEXELS_PER_BYTE) {
+        return Err(EnvironmentError::Implausible {
+            width,
+            height,
+            bytes,
             path: path.into(),
         });
     }
@@ -155,7 +188,11 @@ struct Canvas {
     texels: Vec<Vec3>,
 }
 
-fn read_exr(mut file: BufReader<File>, path: &Path) -> Result<Texels, EnvironmentError> {
+fn read_exr(
+    mut file: BufReader<File>,
+    bytes: u64,
+    path: &Path,
+) -> Result<Texels, EnvironmentError> {
     use exr::prelude::{ReadChannels, ReadLayers, Vec2, read};
     let decode_error = |error: exr::error::Error| EnvironmentError::Decode {
         problem: error.to_string(),
@@ -166,13 +203,13 @@ fn read_exr(mut file: BufReader<File>, path: &Path) -> Result<Texels, Environmen
     for header in &meta.headers {
         let display = header.shared_attributes.display_window.size;
         for size in [display, header.layer_size] {
-            check_size(size.0 as u64, size.1 as u64, path)?;
+            check_size(size.0 as u64, size.1 as u64, bytes, path)?;
         }
     }
     let rgb = meta.headers.iter().find(|header| {
         ["R", "G", "B"].iter().all(|name| {
             let mut channels = header.channels.list.iter();
-            channels.any(|channel| channel.name.eq(*name))
+            channels.any(|channel| channel.name.eq(name))
         })
     });
     let Some(header) = rgb else {
@@ -223,7 +260,7 @@ fn read_exr(mut file: BufReader<File>, path: &Path) -> Result<Texels, Environmen
     Ok((width, height, image.layer_data.channel_data.pixels.texels))
 }
 
-fn read_hdr(file: BufReader<File>, path: &Path) -> Result<Texels, EnvironmentError> {
+fn read_hdr(file: BufReader<File>, bytes: u64, path: &Path) -> Result<Texels, EnvironmentError> {
     use image::ImageDecoder;
     let decode_error = |error: image::ImageError| EnvironmentError::Decode {
         problem: error.to_string(),
@@ -231,7 +268,7 @@ fn read_hdr(file: BufReader<File>, path: &Path) -> Result<Texels, EnvironmentErr
     };
     let decoder = image::codecs::hdr::HdrDecoder::new(file).map_err(decode_error)?;
     let (width, height) = decoder.dimensions();
-    check_size(width.into(), height.into(), path)?;
+    check_size(width.into(), height.into(), bytes, path)?;
     let image = image::DynamicImage::from_decoder(decoder).map_err(decode_error)?;
     let texels = image
         .to_rgb32f()
@@ -242,6 +279,7 @@ fn read_hdr(file: BufReader<File>, path: &Path) -> Result<Texels, EnvironmentErr
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
 

@@ -130,7 +130,7 @@ impl FlatEmitter {
 
 /// ∫ dt / (r² + h² + (t − t₀)²) over `range`, where h is the distance of `pivot` from the line and t₀ where it is nearest.
 ///
-/// With H² = r² + h², a = t_start − t₀, b = t_end − t₀ it is atan2(H (b − a), H² + a b) / H, which never subtracts two
+/// With H² = r² + h² and the range's ends at t₀ + a and t₀ + b it is atan2(H (b − a), H² + a b) / H, which never subtracts two
 /// nearly equal angles.
 fn inverse_square_along(ray: &Ray, pivot: Vec3, radius_squared: f32, range: [f32; 2]) -> f32 {
     let to_pivot: DVec3 = pivot.as_dvec3() - ray.origin.as_dvec3();

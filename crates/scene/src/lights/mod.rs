@@ -16,6 +16,7 @@ mod spot;
 mod triangle;
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
 mod conformance;
 
 pub use directional::DirectionalLight;

@@ -77,6 +77,7 @@ pub(super) fn towards_lamp(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
 

@@ -21,7 +21,7 @@ pub struct QuadLight {
 }
 
 impl QuadLight {
-    /// The rectangle with a `corner` (metres) and two perpendicular `edges` from it; edges[0] × edges[1] points to
+    /// The rectangle with a `corner` (metres) and two perpendicular `edges` from it, whose cross product points to
     /// the front. It emits `radiance`, W/(m² sr).
     pub fn new(corner: Vec3, edges: [Vec3; 2], radiance: Vec3, double_sided: bool) -> Self {
         let [x, y] = edges;

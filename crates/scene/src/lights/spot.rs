@@ -9,8 +9,9 @@ use tyndall_transport::LightSample;
 
 /// A lamp whose intensity falls off between two cones around an axis.
 ///
-/// I(θ) = I₀ saturate((cosθ − cosθ_outer) / (cosθ_inner − cosθ_outer))²
+/// I(θ) = I₀ saturate((cosθ − cosθₒ) / (cosθᵢ − cosθₒ))²
 ///
+/// * θᵢ, θₒ – half-angles of the inner and the outer cone.
 /// * I₀ – intensity on the axis, W/sr.
 /// * θ – angle between the axis and the direction from the lamp.
 ///
@@ -57,7 +58,7 @@ impl SpotLight {
         self.intensity
     }
 
-    /// Radiant power, in W: 2π I₀ (1 − cosθ_inner + (cosθ_inner − cosθ_outer)/3), the integral of I(θ).
+    /// Radiant power, in W: 2π I₀ (1 − cosθᵢ + (cosθᵢ − cosθₒ)/3), the integral of I(θ).
     pub fn power(&self) -> Vec3 {
         let ramp = self.outer_versine - self.inner_versine;
         self.intensity * (TAU * (self.inner_versine + ramp / 3.0))
@@ -84,13 +85,21 @@ impl SpotLight {
         fluence * facing(p, normal, self.position, 0.0)
     }
 
-    /// Fluence of the full intensity over the part of the ray inside the outer cone.
+    /// ∫ I dt / r² over the part of the ray inside the outer cone, with the mean falloff at a few of its points.
     pub(super) fn importance_along(&self, ray: &Ray, t_max: f32) -> f32 {
+        /// Points looked at; between them may be a brighter one, hence never less than [`LEAST`].
+        const POINTS: [f32; 4] = [0.125, 0.375, 0.625, 0.875];
+        const LEAST: f32 = 0.01;
         let Some((start, end)) = self.clip(ray, t_max) else {
             return 0.0;
         };
-        mean(self.intensity)
-            * Equiangular::new(ray, self.position, start, end).angle_over_distance()
+        let distances = Equiangular::new(ray, self.position, start, end);
+        let falloff = POINTS.map(|u| {
+            let p = ray.at(distances.sample(u).0);
+            self.falloff((p - self.position).normalize_or_zero())
+        });
+        let mean_falloff = falloff.iter().sum::<f32>() / POINTS.len() as f32;
+        mean(self.intensity) * mean_falloff.max(LEAST) * distances.angle_over_distance()
     }
 
     pub(super) fn sample(&self, p: Vec3, _u: [f32; 2]) -> Option<LightSample> {
@@ -134,7 +143,7 @@ impl SpotLight {
             .windows(2)
             .filter(|piece| piece[1] > piece[0] && inside(0.5 * (piece[0] + piece[1])));
         let first = pieces.next()?;
-        let last = pieces.last().unwrap_or(first);
+        let last = pieces.next_back().unwrap_or(first);
         Some((first[0] as f32, (last[1] as f32).min(t_max as f32)))
     }
 }

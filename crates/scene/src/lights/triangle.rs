@@ -3,7 +3,7 @@
 //! It is sampled by the solid angle it fills, so that points in fog close to it see no 1/r².
 
 use super::{Emission, FlatEmitter};
-use crate::triangles::geometric_normal;
+use crate::hierarchy::geometric_normal;
 use glam::Vec3;
 use tyndall_math::{Ray, SphericalTriangle};
 use tyndall_transport::LightSample;

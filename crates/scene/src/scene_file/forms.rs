@@ -71,8 +71,45 @@ fn edit_distance(a: &str, b: &str) -> usize {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failing test panics")]
 mod tests {
     use super::*;
+    use crate::scene_file::{Fault, parse};
+    use std::path::Path;
+
+    #[test]
+    fn every_field_has_a_form() {
+        for (owner, text) in [
+            ("Scene", "Scene(?: 0)"),
+            ("LookAt", "Scene(camera: LookAt(?: 0))"),
+            ("Film", "Scene(film: Film(?: 0))"),
+            ("Render", "Scene(render: Render(?: 0))"),
+            ("Point", "Scene(lights: [Point(?: 0)])"),
+            ("Spot", "Scene(lights: [Spot(?: 0)])"),
+            ("Directional", "Scene(lights: [Directional(?: 0)])"),
+            ("Sky", "Scene(lights: [Sky(?: 0)])"),
+            ("Environment", "Scene(lights: [Environment(?: 0)])"),
+            ("Medium", "Scene(media: [Medium(?: 0)])"),
+            ("Box", "Scene(media: [Medium(region: Box(?: 0))])"),
+            ("Sphere", "Scene(media: [Medium(region: Sphere(?: 0))])"),
+            ("Height", "Scene(media: [Medium(density: Height(?: 0))])"),
+            ("Grid", "Scene(media: [Medium(density: Grid(?: 0))])"),
+            (
+                "HenyeyGreenstein",
+                "Scene(media: [Medium(phase: HenyeyGreenstein(?: 0))])",
+            ),
+        ] {
+            let text = text.replace('?', "no_such_field");
+            let error = parse(text.as_bytes(), Path::new("a.ron")).unwrap_err();
+            let Fault::UnknownName { kind, allowed, .. } = error.fault else {
+                panic!("{error}");
+            };
+            assert_eq!(kind, format!("a field of {owner}"));
+            for field in allowed {
+                assert!(form_of(field).is_some(), "{owner} {field}");
+            }
+        }
+    }
 
     #[test]
     fn edit_distances_are_the_textbooks() {

@@ -9,13 +9,13 @@ use tyndall_transport::path::{FirstEvent, Start, trace};
 use tyndall_transport::{Bsdf, Geometry, LightSample, Lights, SurfaceHit, World};
 
 /// Nothing, or the inside of a Lambertian sphere around the origin.
-pub struct Room {
-    pub radius: f32,
-    pub reflectance: f32,
-    pub emission: f32,
+pub(crate) struct Room {
+    pub(crate) radius: f32,
+    pub(crate) reflectance: f32,
+    pub(crate) emission: f32,
 }
 
-pub const OPEN: Room = Room {
+pub(crate) const OPEN: Room = Room {
     radius: f32::INFINITY,
     reflectance: 0.0,
     emission: 0.0,
@@ -48,21 +48,21 @@ impl Geometry for Room {
 
 /// Lamps of a radiant intensity each, and a sky of one radiance; the sky is the last light where it shines.
 #[derive(Default)]
-pub struct Lamps {
-    pub points: Vec<(Vec3, f32)>,
-    pub sky: f32,
+pub(crate) struct Lamps {
+    pub(crate) points: Vec<(Vec3, f32)>,
+    pub(crate) sky: f32,
     sky_index: Vec<usize>,
 }
 
 impl Lamps {
-    pub fn points(points: &[(Vec3, f32)]) -> Self {
+    pub(crate) fn points(points: &[(Vec3, f32)]) -> Self {
         Self {
             points: points.to_vec(),
             ..Self::default()
         }
     }
 
-    pub fn sky(sky: f32) -> Self {
+    pub(crate) fn sky(sky: f32) -> Self {
         Self {
             points: Vec::new(),
             sky,
@@ -83,9 +83,11 @@ impl Lights for Lamps {
     }
 
     fn importance_along(&self, light: usize, ray: &Ray, t_max: f32) -> f32 {
-        self.points.get(light).map_or(4.0 * PI * self.sky * t_max, |(q, i)| {
-            i * warp::Equiangular::new(ray, *q, 0.0, t_max).angle_over_distance()
-        })
+        self.points
+            .get(light)
+            .map_or(4.0 * PI * self.sky * t_max, |(q, i)| {
+                i * warp::Equiangular::new(ray, *q, 0.0, t_max).angle_over_distance()
+            })
     }
 
     fn pivot(&self, light: usize) -> Option<Vec3> {
@@ -137,7 +139,7 @@ impl Lights for Lamps {
 }
 
 /// A homogeneous medium, grey.
-pub fn fog(sigma_t: f32, albedo: f32, region: Region, phase: PhaseFunction) -> Media {
+pub(crate) fn fog(sigma_t: f32, albedo: f32, region: Region, phase: PhaseFunction) -> Media {
     Media::new(vec![
         Medium::new(MediumParams {
             region,
@@ -148,7 +150,7 @@ pub fn fog(sigma_t: f32, albedo: f32, region: Region, phase: PhaseFunction) -> M
     ])
 }
 
-pub fn sphere(radius: f32) -> Region {
+pub(crate) fn sphere(radius: f32) -> Region {
     Region::Sphere {
         center: Vec3::ZERO,
         radius,
@@ -156,7 +158,12 @@ pub fn sphere(radius: f32) -> Region {
 }
 
 /// Mean over the sample index of the layers seen along `ray`, and the standard error of the beauty.
-pub fn pixel(world: &World<'_, Room, Lamps>, ray: Ray, max_depth: Option<u32>, n: u64) -> (Layers, Estimate) {
+pub(crate) fn pixel(
+    world: &World<'_, Room, Lamps>,
+    ray: Ray,
+    max_depth: Option<u32>,
+    n: u64,
+) -> (Layers, Estimate) {
     let mut sum = Layers::default();
     let mut estimate = Estimate::default();
     // Independent keys: the standard error then needs no batches.
@@ -185,35 +192,41 @@ pub fn pixel(world: &World<'_, Room, Lamps>, ray: Ray, max_depth: Option<u32>, n
 
 /// Mean and standard error of a number sampled independently; f64 sums.
 #[derive(Default, Debug, Clone, Copy)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     n: f64,
     sum: f64,
     squares: f64,
 }
 
 impl Estimate {
-    pub fn add(&mut self, value: Vec3) {
+    pub(crate) fn add(&mut self, value: Vec3) {
         let v = f64::from(value.element_sum()) / 3.0;
         self.n += 1.0;
         self.sum += v;
         self.squares += v * v;
     }
 
-    pub fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         self.sum / self.n
     }
 
-    pub fn error(&self) -> f64 {
+    pub(crate) fn error(&self) -> f64 {
         ((self.squares / self.n - self.mean() * self.mean()).max(0.0) / self.n).sqrt()
     }
 
     /// Asserts |mean − exact| ≤ 4.5 standard errors (false alarm 7e-6 a number) and a relative standard error below `worst`.
     /// `rounding` is the relative error of f32 sums and closed forms.
-    pub fn check(&self, name: &str, exact: f64, worst: f64, rounding: f64) {
+    pub(crate) fn check(&self, name: &str, exact: f64, worst: f64, rounding: f64) {
         let (mean, error) = (self.mean(), self.error());
         let z = (mean - exact) / (error + rounding * exact.abs());
-        println!("{name}: {mean:.6e} exact {exact:.6e} relative error {:.4} z {z:.2}", error / exact);
+        println!(
+            "{name}: {mean:.6e} exact {exact:.6e} relative error {:.4} z {z:.2}",
+            error / exact
+        );
         assert!(z.abs() < 4.5, "{name}: {mean} against {exact}, z = {z}");
-        assert!(error <= worst * exact.abs(), "{name}: standard error {error} of {exact}");
+        assert!(
+            error <= worst * exact.abs(),
+            "{name}: standard error {error} of {exact}"
+        );
     }
 }
