@@ -5,3 +5,8 @@
 pub mod golden;
 pub mod image;
 pub mod program;
+
+/// Compiles and runs the example of the workspace's README.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

@@ -1,6 +1,7 @@
 //! What ends the command, and with which exit status.
 
 use tyndall_render::error::RenderError;
+use tyndall_render::probe::ProbeError;
 use tyndall_scene::SceneError;
 
 /// Why the command could not do what it was asked.
@@ -12,6 +13,19 @@ pub(crate) enum CliError {
     /// A render, a comparison or an image file failed.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// A probe was asked what has no answer.
+    #[error(transparent)]
+    Probe(#[from] ProbeError),
+    /// Exact benchmarks that this build on this machine does not meet.
+    #[error(
+        "{failed} of {rows} exact benchmarks failed, which by chance happens once in hundreds of runs; please report it with the table above and the machine"
+    )]
+    Verify {
+        /// Rows that failed.
+        failed: usize,
+        /// All rows.
+        rows: usize,
+    },
     /// `tyndall info` was given a file of a kind it does not know.
     #[error(
         "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images)"
@@ -32,9 +46,9 @@ impl CliError {
     /// 2 where the command or an input file is wrong, 1 for anything else.
     pub(crate) fn status(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::UnknownKind { .. } => 2,
+            Self::Scene(_) | Self::Probe(_) | Self::UnknownKind { .. } => 2,
             Self::Render(error) if error.is_input() => 2,
-            Self::Render(_) | Self::Output(_) | Self::Internal(_) => 1,
+            Self::Render(_) | Self::Verify { .. } | Self::Output(_) | Self::Internal(_) => 1,
         }
     }
 }

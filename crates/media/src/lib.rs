@@ -60,7 +60,7 @@ pub use gradient::EndGradients;
 pub use media::Media;
 pub use medium::{MAX_SIGMA_T, MIN_SCALE_HEIGHT, Medium, MediumError, MediumParams};
 pub use phase::{Asymmetry, AsymmetryError, HenyeyGreenstein, PhaseFunction};
-pub use point::MediumPoint;
+pub use point::{MediumPoint, PhaseValue};
 pub use region::Region;
 pub use segment::Segment;
 

@@ -2,7 +2,7 @@
 //!
 //! Overlapping media add: coefficients sum, phase functions mix in proportion to scattering, channel by channel.
 
-use crate::Medium;
+use crate::{Medium, PhaseFunction};
 use glam::Vec3;
 use smallvec::SmallVec;
 
@@ -17,6 +17,18 @@ pub struct MediumPoint<'a> {
     pub emission: Vec3,
     position: Vec3,
     lobes: SmallVec<[Lobe<'a>; 4]>,
+}
+
+/// The media's common phase function for one pair of directions; see [`MediumPoint::phase`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseValue {
+    /// Σ σs p / Σ σs over the media, per steradian.
+    pub value: Vec3,
+    /// Its derivative with respect to the cosine of scattering μ = −w_i · w_o.
+    pub slope: Vec3,
+    /// Its gradient per metre and channel when the point moves and the directions stay: media of different phase
+    /// functions change their shares.
+    pub gradient: [Vec3; 3],
 }
 
 /// One medium's share of the scattering.
@@ -63,6 +75,43 @@ impl<'a> MediumPoint<'a> {
             .iter()
             .map(|lobe| lobe.medium.sigma_s() * (lobe.density * lobe.medium.phase().eval(w_o, w_i)))
             .sum()
+    }
+
+    /// The phase functions mixed by scattering, channel by channel, and how the mixture changes.
+    ///
+    /// A channel that does not scatter is taken to scatter equally in all directions.
+    pub fn phase(&self, w_o: Vec3, w_i: Vec3) -> PhaseValue {
+        let (mut sum, mut slope, mut moved) = (Vec3::ZERO, Vec3::ZERO, [Vec3::ZERO; 3]);
+        for lobe in &self.lobes {
+            let medium = lobe.medium;
+            let value = medium.phase().eval(w_o, w_i);
+            sum += medium.sigma_s() * (lobe.density * value);
+            slope += medium.sigma_s() * (lobe.density * medium.phase().slope(w_o, w_i));
+            let gradient = medium.density().gradient(self.position) * value;
+            for (channel, moved) in moved.iter_mut().enumerate() {
+                *moved += medium.sigma_s()[channel] * gradient;
+            }
+        }
+        let scatters = self.sigma_s.cmpgt(Vec3::ZERO);
+        let isotropic = Vec3::splat(PhaseFunction::Isotropic.eval(w_o, w_i));
+        let value = Vec3::select(scatters, sum / self.sigma_s, isotropic);
+        // The quotient rule; with one phase function alone the terms cancel, so that one is told apart.
+        let mixes = self
+            .lobes
+            .windows(2)
+            .any(|l| l[0].medium.phase() != l[1].medium.phase());
+        let density = self.grad_ln_sigma_s();
+        PhaseValue {
+            value,
+            slope: Vec3::select(scatters, slope / self.sigma_s, Vec3::ZERO),
+            gradient: std::array::from_fn(|c| {
+                if mixes && scatters.test(c) {
+                    moved[c] / self.sigma_s[c] - density[c] * value[c]
+                } else {
+                    Vec3::ZERO
+                }
+            }),
+        }
     }
 
     /// Density per steradian with which [`MediumPoint::sample_phase`] picks `w_i`; 0 where nothing scatters.
@@ -219,6 +268,23 @@ mod tests {
             assert_eq!(point.phase_pdf(Vec3::Z, Vec3::X), 0.0);
             assert_eq!(point.scattering(Vec3::Z, Vec3::X), Vec3::ZERO);
             assert_eq!(point.grad_ln_sigma_s(), [Vec3::ZERO; 3]);
+        }
+    }
+
+    #[test]
+    fn the_mixed_phase_function_and_its_gradient_agree_with_scattering() {
+        let media = media();
+        let (w_o, w_i) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, -0.8, 0.6));
+        let h = 1e-2;
+        for p in [ABOVE, Vec3::new(3.0, -1.0, 0.0)] {
+            let share = |p: Vec3| media.at(p).scattering(w_o, w_i) / media.at(p).sigma_s;
+            let phase = media.at(p).phase(w_o, w_i);
+            assert!((phase.value - share(p)).abs().max_element() < 1e-6);
+            let slope = (share(p + h * Vec3::Y) - share(p - h * Vec3::Y)) / (2.0 * h);
+            for channel in 0..3 {
+                // f32 rounding over the step.
+                assert!((phase.gradient[channel] - slope[channel] * Vec3::Y).length() < 3e-5);
+            }
         }
     }
 

@@ -24,8 +24,6 @@ pub struct Pixel {
     pub transmittance: Vec3,
     /// Distance to the first surface in metres, 0 where there is none.
     pub depth: f32,
-    /// Number of cache records drawn on.
-    pub records: f32,
 }
 
 /// Number of sums kept for the even samples' colour, after those of the layers.
@@ -112,7 +110,7 @@ impl Film {
         total as f64 / self.counts.len() as f64
     }
 
-    /// The image so far: means over samples; a pixel without samples is black. `beauty` is the sum of the layers it is made of, as
+    /// The image so far: means over samples; a pixel without samples is black. The film knows no records: theirs is left at 0. `beauty` is the sum of the layers it is made of, as
     /// the image holds them, so that it equals them to rounding.
     pub fn image(&self) -> Image {
         let mut image = Image {
@@ -123,6 +121,7 @@ impl Film {
         for layer in self.layers.iter() {
             for (c, name) in layer.channels.iter().enumerate() {
                 let values = match layer.source {
+                    Source::Records => vec![0.0; self.counts.len()],
                     Source::Beauty => self.beauty(c),
                     Source::PartOfBeauty(_) | Source::Mean(_) => self.stored_mean(layer, c),
                     Source::SampleCount => {
@@ -135,6 +134,11 @@ impl Film {
         image
     }
 
+    /// The colour alone, whatever layers were asked for: red, green and blue of every pixel.
+    pub fn colour(&self) -> [Vec<f32>; 3] {
+        std::array::from_fn(|c| self.beauty(c))
+    }
+
     /// Estimated error of the image so far, from its two halves: the square root of the mean of V w, where
     /// V = (a − b)² n m / (n + m)² estimates the variance of a pixel's value from the means a, b of its n even and m odd samples
     /// (((a − b)/2)² for halves of one size), and w is the weight of the relative error at the image's 5 × 5 median.
@@ -145,9 +149,7 @@ impl Film {
             return None;
         }
         let (width, height) = (self.crop.width as usize, self.crop.height as usize);
-        let smooth: Vec<Vec<f32>> = (0..3)
-            .map(|c| median_5x5(&self.beauty(c), width, height))
-            .collect();
+        let smooth = self.colour().map(|c| median_5x5(&c, width, height));
         let weights = weights(&smooth);
         let mut sum = 0.0;
         for (i, (sums, n)) in self.sums.chunks(self.stride).zip(&self.counts).enumerate() {

@@ -44,6 +44,8 @@ pub enum Source {
     Mean(fn(&Pixel) -> Vec3),
     /// The number of samples taken.
     SampleCount,
+    /// The number of cache records asked for through the pixel, counted when the cache was filled.
+    Records,
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];
@@ -103,8 +105,8 @@ pub static LAYERS: &[Layer] = &[
         name: "records",
         channels: &["records"],
         presence: Presence::Asked,
-        about: "cache records that a camera ray draws on, mean number",
-        source: Source::Mean(|p| Vec3::splat(p.records)),
+        about: "cache records asked for through the pixel, number",
+        source: Source::Records,
     },
     Layer {
         name: "samples",

@@ -3,12 +3,14 @@
 //! Stratified directions over the sphere start unbiased paths; light straight from emitters is left out, because single
 //! scattering is computed where it is needed.
 
+use crate::lamp_directions::LampDirections;
 use crate::path::{FirstEvent, Start, lamps_in_fog, trace};
 use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, World};
 use glam::Vec3;
 use std::f32::consts::PI;
 use tyndall_math::{Key, Ray, Sampler, warp};
+use tyndall_media::MediumPoint;
 
 /// Batches over which standard errors are taken.
 const BATCHES: usize = 16;
@@ -18,10 +20,10 @@ const WARP_REACH: f32 = 0.9;
 /// the noise of the gradient outweighs the missing boundary term.
 const WARP_REACH_MIN: f32 = 0.1;
 
-/// Isotropic in-scattered radiance of light scattered before, at one point.
+/// In-scattered radiance of light scattered before, at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Gathered {
-    /// (1/4π) ∫ L dω per colour channel, W/(m² sr).
+    /// ∫ p L dω per colour channel, W/(m² sr); p is 1/4π where directions are weighted alike.
     pub value: Vec3,
     /// Its gradient per metre, one vector per channel.
     pub gradient: [Vec3; 3],
@@ -35,9 +37,67 @@ pub struct Gathered {
     pub harmonic_mean_distance: f32,
 }
 
-/// Gathers multiple-scattered light at `x` from `n_rays` paths (at least one).
+/// Directions in which light is gathered at a point: by the phase function there, and close to lamps.
+#[derive(Clone, Debug)]
+pub struct GatherDirections<'m> {
+    lamps: LampDirections,
+    /// The direction towards the eye and the medium, where it matters.
+    lobe: Option<(Vec3, MediumPoint<'m>)>,
+}
+
+/// One of [`GatherDirections`].
+#[derive(Clone, Copy, Debug)]
+pub struct GatherDirection {
+    /// Unit direction to where light comes from.
+    pub w_i: Vec3,
+    /// Phase function over the density of this direction, per colour channel.
+    pub weight: Vec3,
+    /// The uniform density over the density of this direction.
+    uniform_weight: f32,
+}
+
+impl<'m> GatherDirections<'m> {
+    /// Directions at `x` for light that leaves `towards` the eye; `None` weights them all alike, as isotropic media do.
+    pub fn new<G, L: Lights>(world: &World<'m, G, L>, x: Vec3, towards: Option<Vec3>) -> Self {
+        let medium = world.media.at(x);
+        let lamps = lamps_in_fog(world.lights, x, &medium);
+        let matters = !world.media.is_isotropic() && medium.sigma_s != Vec3::ZERO;
+        Self {
+            lamps,
+            lobe: towards.filter(|_| matters).map(|w_o| (w_o, medium)),
+        }
+    }
+
+    /// The direction for two numbers in [0, 1).
+    pub fn sample(&self, [u, v]: [f32; 2]) -> GatherDirection {
+        let share = self.lamps.share();
+        let rest = (u - share) / (1.0 - share);
+        let w_i = match &self.lobe {
+            _ if u < share => self.lamps.sample([u, v]),
+            None => warp::uniform_sphere([rest, v]),
+            Some((w_o, medium)) => {
+                medium
+                    .sample_phase(*w_o, [rest.min(1.0 - f32::EPSILON), v])
+                    .0
+            }
+        };
+        let uniform = 0.25 / PI;
+        let (phase, pdf) = match &self.lobe {
+            None => (Vec3::splat(uniform), uniform),
+            Some((w_o, medium)) => (medium.phase(*w_o, w_i).value, medium.phase_pdf(*w_o, w_i)),
+        };
+        let pdf = (1.0 - share) * pdf + self.lamps.pdf(w_i);
+        GatherDirection {
+            w_i,
+            weight: phase / pdf,
+            uniform_weight: uniform / pdf,
+        }
+    }
+}
+
+/// Gathers multiple-scattered light at `x` from `n_rays` paths (at least one), weighting all directions alike.
 ///
-/// `max_depth` counts the scattering at `x` itself. Isotropic scattering at `x` is assumed.
+/// `max_depth` counts the scattering at `x` itself.
 pub fn multiple<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
@@ -45,34 +105,38 @@ pub fn multiple<G: Geometry, L: Lights>(
     max_depth: Option<u32>,
     key: Key,
 ) -> Gathered {
-    let lamps = lamps_in_fog(world.lights, x, &world.media.at(x));
-    // Each start with its weight, the uniform density over the density of its direction.
-    let starts: Vec<(Start, f32)> = (0..n_rays)
+    multiple_towards(world, x, None, n_rays, max_depth, key)
+}
+
+/// As [`multiple`], with directions weighted by the phase function at `x` for light that leaves `towards` the eye.
+///
+/// Value and gradient are those of ∫ p L dω with p the media's phase functions mixed by scattering.
+pub fn multiple_towards<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    towards: Option<Vec3>,
+    n_rays: usize,
+    max_depth: Option<u32>,
+    key: Key,
+) -> Gathered {
+    let directions = GatherDirections::new(world, x, towards);
+    let starts: Vec<(Start, GatherDirection)> = (0..n_rays)
         .map(|i| {
-            let [u, v] = Sampler::new(key, i as u64).next_2d();
-            let w = if u < lamps.share() {
-                lamps.sample([u, v])
-            } else {
-                warp::uniform_sphere([(u - lamps.share()) / (1.0 - lamps.share()), v])
-            };
-            let ray = Ray::new(x, w);
+            let direction = directions.sample(Sampler::new(key, i as u64).next_2d());
+            let ray = Ray::new(x, direction.w_i);
             let start = Start {
                 ray,
                 hit: Some(world.geometry.intersect(&ray, f32::INFINITY)),
                 first: FirstEvent::Any,
                 max_depth: max_depth.map(|d| d.saturating_sub(1)),
             };
-            let uniform = 0.25 / PI;
-            (
-                start,
-                uniform / ((1.0 - lamps.share()) * uniform + lamps.pdf(w)),
-            )
+            (start, direction)
         })
         .collect();
     let distances = || {
         let met = starts
             .iter()
-            .filter_map(|(s, weight)| Some((s.hit.flatten()?.t, *weight)));
+            .filter_map(|(s, direction)| Some((s.hit.flatten()?.t, direction.uniform_weight)));
         met.map(|(t, weight)| (t.max(f32::MIN_POSITIVE), weight))
     };
     let nearest = distances().map(|(t, _)| t).fold(f32::INFINITY, f32::min);
@@ -80,14 +144,17 @@ pub fn multiple<G: Geometry, L: Lights>(
     let radius = warp_radius(world, x, nearest);
 
     let mut batches = Batches::default();
-    for (i, (start, weight)) in starts.iter().enumerate() {
+    for (i, (start, direction)) in starts.iter().enumerate() {
         let mut sampler = Sampler::new(key, i as u64);
-        let mut visitor = WarpVisitor::new(world.media, x, radius);
+        let towards = directions.lobe.as_ref().map(|(w_o, _)| *w_o);
+        let mut visitor = WarpVisitor::new(world.media, x, radius, towards);
         trace(world, start, &mut sampler, &mut visitor);
+        let weight = direction.weight;
+        let [dr, dg, db] = visitor.gradient;
         batches.add(
             i,
-            visitor.value * *weight,
-            visitor.gradient.map(|d| d * *weight),
+            visitor.value * weight,
+            [dr * weight.x, dg * weight.y, db * weight.z],
         );
     }
     let [value, dr, dg, db] = batches.means();

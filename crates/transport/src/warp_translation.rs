@@ -5,6 +5,9 @@
 //!
 //! ∇∫f = ∫ f [ Σ over segments ∂ ln(T G) + Σ over vertices (α ∂ ln σs + ∂α) ],  α(y) = (1 − ρ²/D²)² for ρ = |y − x| < D, else 0.
 //!
+//! Where scattering is not isotropic the directions at a vertex turn when its neighbours move otherwise than itself, and
+//! ∂ ln p(μ) joins the sum; towards the eye the direction stays.
+//!
 //! Derivation: change of variables y → y + α(y) δ in every medium vertex and the divergence theorem; there is no boundary
 //! term because α f vanishes where f jumps. With the vertices moving alike, the 1/r terms of neighbouring vertices cancel
 //! (|α(y) − α(y')| ≤ Lip(α) |y − y'|).
@@ -25,12 +28,24 @@ struct End {
     normal: Option<Vec3>,
 }
 
+/// The direction in which light leaves a vertex, towards the start of the path, and how fast it turns.
+#[derive(Clone, Copy)]
+struct Leaving {
+    w_o: Vec3,
+    /// (α of the vertex before − α) over the distance: ∂w_o = (1 − w_o w_oᵀ) rate.
+    rate: f32,
+}
+
 /// Accumulates value and gradient of the light that arrives at a point along one path, light straight from emitters left out.
 pub(crate) struct WarpVisitor<'m> {
     media: &'m Media,
     center: Vec3,
     radius: f32,
     last: End,
+    /// Where scattering at `last` depends on directions.
+    leaving: Option<Leaving>,
+    /// Whether any medium scatters otherwise than isotropically.
+    lobes: bool,
     started: bool,
     /// ∂ ln f of the path so far, per colour channel.
     log_gradient: [Vec3; 3],
@@ -39,8 +54,9 @@ pub(crate) struct WarpVisitor<'m> {
 }
 
 impl<'m> WarpVisitor<'m> {
-    /// For paths that start at `center`; `radius` is the D of the displacement field.
-    pub(crate) fn new(media: &'m Media, center: Vec3, radius: f32) -> Self {
+    /// For paths that start at `center`; `radius` is the D of the displacement field. The light leaves in the direction
+    /// `towards`, or is weighted alike for all directions.
+    pub(crate) fn new(media: &'m Media, center: Vec3, radius: f32, towards: Option<Vec3>) -> Self {
         Self {
             media,
             center,
@@ -50,6 +66,8 @@ impl<'m> WarpVisitor<'m> {
                 alpha: 1.0,
                 normal: None,
             },
+            leaving: towards.map(|w_o| Leaving { w_o, rate: 0.0 }),
+            lobes: !media.is_isotropic(),
             started: false,
             log_gradient: [Vec3::ZERO; 3],
             value: Vec3::ZERO,
@@ -79,6 +97,52 @@ impl<'m> WarpVisitor<'m> {
         for (sum, (d_a, d_b)) in log_gradient.iter_mut().zip(tau.d_a.iter().zip(&tau.d_b)) {
             *sum += geometry - *d_a * a.alpha - *d_b * b.alpha;
         }
+    }
+
+    /// Adds what turning directions do to the phase function at `at`, where light comes from the unit direction `w_i` that
+    /// turns at `rate`: ∂μ = −(w_o − (w_o·w_i) w_i) rate − (w_i − (w_o·w_i) w_o) rateₒ.
+    fn turn(
+        &self,
+        log_gradient: &mut [Vec3; 3],
+        at: End,
+        leaving: Option<Leaving>,
+        w_i: Vec3,
+        rate: f32,
+    ) {
+        let Some(Leaving { w_o, rate: leaving }) = leaving else {
+            return;
+        };
+        if at.alpha == 0.0 && rate == 0.0 && leaving == 0.0 {
+            return;
+        }
+        let cosine = w_o.dot(w_i);
+        let d_mu = -(w_o - cosine * w_i) * rate - (w_i - cosine * w_o) * leaving;
+        let phase = self.media.at(at.position).phase(w_o, w_i);
+        for (c, sum) in log_gradient.iter_mut().enumerate() {
+            if phase.value[c] > 0.0 {
+                *sum += (d_mu * phase.slope[c] + phase.gradient[c] * at.alpha) / phase.value[c];
+            }
+        }
+    }
+
+    /// [`WarpVisitor::turn`] at `a` for light that comes from `b`; returns how it leaves `b`.
+    fn turn_towards(
+        &self,
+        log_gradient: &mut [Vec3; 3],
+        (a, leaving): (End, Option<Leaving>),
+        b: End,
+    ) -> Option<Leaving> {
+        let offset = b.position - a.position;
+        let r = offset.length();
+        if !self.lobes || r <= 0.0 {
+            return None;
+        }
+        let (w_i, rate) = (offset / r, (b.alpha - a.alpha) / r);
+        self.turn(log_gradient, a, leaving, w_i, rate);
+        (b.normal.is_none()).then_some(Leaving {
+            w_o: -w_i,
+            rate: -rate,
+        })
     }
 
     fn extend_to_vertex(&self, log_gradient: &mut [Vec3; 3], vertex: Vertex<'_, '_>) -> End {
@@ -135,7 +199,9 @@ fn geometry_log_gradient(a: End, b: End) -> Vec3 {
 impl Visitor for WarpVisitor<'_> {
     fn vertex(&mut self, vertex: Vertex<'_, '_>) {
         let mut log_gradient = self.log_gradient;
-        self.last = self.extend_to_vertex(&mut log_gradient, vertex);
+        let end = self.extend_to_vertex(&mut log_gradient, vertex);
+        self.leaving = self.turn_towards(&mut log_gradient, (self.last, self.leaving), end);
+        self.last = end;
         self.log_gradient = log_gradient;
         self.started = true;
     }
@@ -146,9 +212,13 @@ impl Visitor for WarpVisitor<'_> {
             return;
         }
         let mut log_gradient = self.log_gradient;
-        let from = match last {
-            Some(vertex) => self.extend_to_vertex(&mut log_gradient, vertex),
-            None => self.last,
+        let (from, leaving) = match last {
+            Some(vertex) => {
+                let end = self.extend_to_vertex(&mut log_gradient, vertex);
+                let before = (self.last, self.leaving);
+                (end, self.turn_towards(&mut log_gradient, before, end))
+            }
+            None => (self.last, self.leaving),
         };
         match source {
             Source::Medium => {}
@@ -159,15 +229,18 @@ impl Visitor for WarpVisitor<'_> {
                     normal: (normal != Vec3::ZERO).then_some(normal),
                 };
                 self.extend(&mut log_gradient, from, light);
+                self.turn_towards(&mut log_gradient, (from, leaving), light);
             }
-            Source::Far(w_i) if from.alpha > 0.0 => {
-                let ray = Ray::new(from.position, w_i);
-                let (_, tau) = self.media.optical_depth_gradient_rigid(&ray, f32::INFINITY);
-                for c in 0..3 {
-                    log_gradient[c] -= tau[c] * from.alpha;
+            Source::Far(w_i) => {
+                self.turn(&mut log_gradient, from, leaving, w_i, 0.0);
+                if from.alpha > 0.0 {
+                    let ray = Ray::new(from.position, w_i);
+                    let (_, tau) = self.media.optical_depth_gradient_rigid(&ray, f32::INFINITY);
+                    for c in 0..3 {
+                        log_gradient[c] -= tau[c] * from.alpha;
+                    }
                 }
             }
-            Source::Far(_) => {}
         }
         self.value += value;
         for c in 0..3 {

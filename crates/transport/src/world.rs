@@ -69,6 +69,12 @@ pub trait Lights: Sync {
     /// Radiance that arrives from direction `w_i` (pointing away from the scene) out of environment light `light`.
     fn environment_radiance(&self, light: usize, w_i: Vec3) -> Vec3;
 
+    /// ∇ ln I per metre, where the intensity that `light` sends to `p` depends on the direction it leaves in (a spot's
+    /// falloff); zero for other lights.
+    fn grad_ln_intensity(&self, _light: usize, _p: Vec3) -> Vec3 {
+        Vec3::ZERO
+    }
+
     /// Distance from `p` to the nearest point-like light (point or spot), infinite where there is none.
     fn distance_to_point_lights(&self, p: Vec3) -> f32;
 }

@@ -86,20 +86,15 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
             .into_iter()
             .zip(exact)
         {
-            let media = fog(
-                sigma_t,
-                sigma_s / sigma_t,
-                Region::Everywhere,
-                phase,
-            );
+            let media = fog(sigma_t, sigma_s / sigma_t, Region::Everywhere, phase);
             let world = World {
                 geometry: &OPEN,
                 lights: &lamps,
                 media: &media,
             };
-            let (layers, estimate) = pixel(&world, ray, Some(1), 200_000);
+            let (layers, estimate) = pixel(&world, ray, Some(1), 40_000);
             assert_eq!(layers.multiple, Vec3::ZERO);
-            estimate.check(&format!("airlight h {h} {phase:?}"), exact, 5e-3, 1e-4);
+            estimate.check(&format!("airlight h {h} {phase:?}"), exact, 3e-2, 1e-4);
         }
     }
 }
@@ -124,12 +119,12 @@ fn all_orders_beside_a_lamp_in_endless_fog_are_exact() {
             &world,
             Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X),
             None,
-            400_000,
+            60_000,
         );
         estimate.check(
             &format!("pixel c {albedo} t0 {t0} h {h}"),
             exact,
-            5e-3,
+            2e-2,
             1e-4,
         );
     }
@@ -154,8 +149,8 @@ fn spheres_under_a_uniform_sky_are_exact() {
             media: &media,
         };
         let ray = Ray::new(Vec3::new(-2.0 * radius, impact * radius, 0.0), Vec3::X);
-        let (_, estimate) = pixel(&world, ray, None, 200_000);
-        estimate.check(&format!("sphere R {radius} c {albedo}"), exact, 5e-3, 1e-5);
+        let (_, estimate) = pixel(&world, ray, None, 80_000);
+        estimate.check(&format!("sphere R {radius} c {albedo}"), exact, 1e-2, 1e-5);
     }
 }
 
@@ -182,7 +177,7 @@ fn a_white_furnace_shows_one_everywhere() {
             media: &media,
         };
         let ray = Ray::new(Vec3::new(-2.0, 0.3, 0.0), Vec3::X);
-        let (_, estimate) = pixel(&world, ray, None, 200_000);
+        let (_, estimate) = pixel(&world, ray, None, 80_000);
         estimate.check(&format!("furnace {sigma} {phase:?}"), 1.0, 3e-3, 1e-5);
     }
 }
@@ -214,7 +209,7 @@ fn an_isothermal_furnace_shows_its_temperature() {
         &world,
         Ray::new(Vec3::new(0.9, 0.9, 0.0), Vec3::NEG_X),
         None,
-        200_000,
+        80_000,
     );
     estimate.check("isothermal", 1.0, 3e-3, 1e-5);
 }
@@ -244,11 +239,11 @@ fn a_closed_room_with_fog_and_a_lamp_is_exact() {
             // From just inside the wall along the full chord.
             let x = -(1.0 - impact * impact).sqrt() * radius * 0.9999;
             let ray = Ray::new(Vec3::new(x, impact * radius * 0.9999, 0.0), Vec3::X);
-            let (_, estimate) = pixel(&world, ray, None, 300_000);
+            let (_, estimate) = pixel(&world, ray, None, 40_000);
             estimate.check(
                 &format!("room R {radius} c {albedo} b {impact}"),
                 exact,
-                6e-3,
+                3e-2,
                 3e-4,
             );
         }
@@ -269,7 +264,7 @@ fn check_record(
         Estimate::default(),
         Estimate::default(),
     );
-    for i in 0..64 {
+    for i in 0..32 {
         let key = Key {
             seed: 5,
             purpose: Purpose::Record,
@@ -321,7 +316,7 @@ fn records_in_endless_fog_have_the_exact_value_and_gradient() {
             x,
             phi,
             slope - uncollided(r),
-            [0.01, 0.05],
+            [0.03, 0.08],
         );
     }
 }
@@ -352,6 +347,6 @@ fn records_in_a_closed_room_have_the_exact_gradient() {
         Vec3::new(0.3, -0.24, 0.32),
         phi - uncollided,
         slope + uncollided * (1.0 + 2.0 / r),
-        [0.01, 0.05],
+        [0.03, 0.08],
     );
 }

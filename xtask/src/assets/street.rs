@@ -64,64 +64,72 @@ fn ground(document: &mut Document) {
 }
 
 fn houses(document: &mut Document) {
-    let plaster = document.lambertian("plaster", [0.55, 0.50, 0.42]);
-    let brick = document.lambertian("brick", [0.36, 0.17, 0.12]);
-    let tiles = document.lambertian("tiles", [0.20, 0.10, 0.08]);
-    let glass = document.lambertian("dark glass", [0.03, 0.035, 0.04]);
-    let [mut fronts, mut others, mut roofs, mut panes] = [(); 4].map(|()| Mesh::default());
+    let mut rows = Rows::default();
     for side in [-1.0, 1.0] {
         let mut z = 12.0;
         for house in 0..13 {
             let [width, eaves, depth] =
-                HOUSES[(house + if side > 0.0 { 2 } else { 0 }) % HOUSES.len()];
-            let span = |near: f32, far: f32| {
-                [
-                    f32::min(side * near, side * far),
-                    f32::max(side * near, side * far),
-                ]
-            };
-            let x = span(FRONT, FRONT + depth);
-            let walls = if house % 2 == 0 {
-                &mut fronts
-            } else {
-                &mut others
-            };
-            walls.cuboid([x[0], 0.0, z - width], [x[1], eaves, z]);
-
-            let ridge = Vec3::new((x[0] + x[1]) / 2.0, eaves + 0.42 * depth, z);
-            let gable = [
-                Vec3::new(x[0] - 0.4, eaves, z),
-                Vec3::new(x[1] + 0.4, eaves, z),
-                ridge,
-            ];
-            roofs.prism(&gable.map(|p| p - Vec3::Z * width), Vec3::Z * width);
-
-            let pane = span(FRONT - 0.03, FRONT + 0.1);
-            for (floor, sill) in [1.1, 4.0]
-                .into_iter()
-                .enumerate()
-                .filter(|(_, sill)| sill + 2.0 < eaves)
-            {
-                for i in 0..3 {
-                    let middle = z - width * (i as f32 + 0.5) / 3.0;
-                    let (half, foot) = if (floor, i) == (0, 1) {
-                        (0.5, 0.14)
-                    } else {
-                        (0.45, sill)
-                    };
-                    panes.cuboid(
-                        [pane[0], foot, middle - half],
-                        [pane[1], sill + 1.3, middle + half],
-                    );
-                }
-            }
+                HOUSES[(house + usize::from(side > 0.0) * 2) % HOUSES.len()];
+            rows.house(
+                house % 2,
+                [side * FRONT, side * (FRONT + depth)],
+                [z - width, z],
+                eaves,
+            );
             z -= width + 0.6 * (house % 3) as f32;
         }
     }
-    document.part("plaster houses", &fronts, plaster);
-    document.part("brick houses", &others, brick);
-    document.part("roofs", &roofs, tiles);
-    document.part("windows and doors", &panes, glass);
+    let plaster = document.lambertian("plaster", [0.55, 0.50, 0.42]);
+    let brick = document.lambertian("brick", [0.36, 0.17, 0.12]);
+    let tiles = document.lambertian("tiles", [0.20, 0.10, 0.08]);
+    let glass = document.lambertian("dark glass", [0.03, 0.035, 0.04]);
+    document.part("plaster houses", &rows.walls[0], plaster);
+    document.part("brick houses", &rows.walls[1], brick);
+    document.part("roofs", &rows.roofs, tiles);
+    document.part("windows and doors", &rows.panes, glass);
+}
+
+/// The rows of houses, by material.
+#[derive(Default)]
+struct Rows {
+    walls: [Mesh; 2],
+    roofs: Mesh,
+    panes: Mesh,
+}
+
+impl Rows {
+    /// A house from front to back along `x` and from far to near along `z`, with its gables across the street.
+    fn house(&mut self, style: usize, x: [f32; 2], z: [f32; 2], eaves: f32) {
+        let [front, back] = x;
+        let (left, right) = (front.min(back), front.max(back));
+        self.walls[style].cuboid([left, 0.0, z[0]], [right, eaves, z[1]]);
+
+        let ridge = Vec3::new((left + right) / 2.0, eaves + 0.42 * (right - left), z[0]);
+        let gable = [
+            Vec3::new(left - 0.4, eaves, z[0]),
+            Vec3::new(right + 0.4, eaves, z[0]),
+            ridge,
+        ];
+        self.roofs.prism(&gable, Vec3::Z * (z[1] - z[0]));
+
+        for i in 0..3 {
+            let middle = z[1] - (z[1] - z[0]) * (i as f32 + 0.5) / 3.0;
+            // The middle one is a door; its threshold lies on the pavement.
+            let (half, foot) = if i == 1 { (0.5, 0.14) } else { (0.45, 1.1) };
+            self.pane(front, middle, half, [foot, 2.4]);
+            if eaves > 6.0 {
+                self.pane(front, middle, 0.45, [4.0, 5.3]);
+            }
+        }
+    }
+
+    /// Glass or a door, 3 cm before the front of a house.
+    fn pane(&mut self, front: f32, middle: f32, half: f32, y: [f32; 2]) {
+        let (outside, inside) = (front - 0.03 * front.signum(), front + 0.1 * front.signum());
+        let min = [outside.min(inside), y[0], middle - half];
+        self.panes
+            .cuboid(min, [outside.max(inside), y[1], middle + half]);
+    }
 }
 
 /// Twenty lamps on each side, 6 m apart; the post is built around its light.

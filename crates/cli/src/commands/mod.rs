@@ -2,7 +2,9 @@
 
 mod compare;
 mod info;
+mod probe;
 mod render;
+mod verify;
 
 use crate::args::{Command, SourceArgs};
 use crate::error::CliError;
@@ -15,14 +17,8 @@ pub(crate) fn run(command: &Command) -> Result<(), CliError> {
         Command::Render(args) => render::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),
-        Command::Probe(_) => Err(not_built(
-            "`tyndall probe`",
-            "render the scene with --layers single,multiple instead",
-        )),
-        Command::Verify(_) => Err(not_built(
-            "`tyndall verify`",
-            "the exact benchmarks run in the project's test suite",
-        )),
+        Command::Probe(args) => probe::run(args),
+        Command::Verify(args) => verify::run(args),
     }
 }
 

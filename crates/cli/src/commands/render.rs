@@ -59,6 +59,15 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
             "{:.1} s on {} threads, {:.1} samples per pixel",
             stats.wall_s, stats.threads, stats.spp
         ));
+        if let Some(error) = &stats.estimated_error {
+            output::say(&format!(
+                "estimated error {:.2} % (95 %: {:.2} to {:.2} %), bias {:+.2} %",
+                100.0 * error.value,
+                100.0 * error.ci95[0],
+                100.0 * error.ci95[1],
+                100.0 * error.bias
+            ));
+        }
         for path in &outputs {
             output::say(&format!("wrote {}", path.display()));
         }

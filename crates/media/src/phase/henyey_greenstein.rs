@@ -76,6 +76,14 @@ impl HenyeyGreenstein {
         h * (1.0 + a) / (4.0 * PI * d * d.sqrt())
     }
 
+    /// dp/dμ, per steradian: 3 g p / (1 + g² − 2 g μ).
+    pub fn slope(&self, w_o: Vec3, w_i: Vec3) -> f32 {
+        let (a, peak) = self.peak(w_o);
+        let h = 1.0 - a;
+        let d = h * h + a * (w_i - peak).length_squared();
+        3.0 * self.g.0 * self.eval(w_o, w_i) / d
+    }
+
     /// A direction `w_i` drawn in proportion to [`HenyeyGreenstein::eval`], and that value.
     pub fn sample(&self, w_o: Vec3, [u, v]: [f32; 2]) -> (Vec3, f32) {
         let (a, peak) = self.peak(w_o);

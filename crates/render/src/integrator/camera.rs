@@ -20,7 +20,7 @@ use tyndall_transport::world::{Geometry, SurfaceHit, World};
 /// Single-scattering samples along each camera ray of the cached integrator.
 const SINGLE_SAMPLES: u32 = 2;
 /// Lookups of multiple scattering along each camera ray.
-const MULTIPLE_SAMPLES: u32 = 2;
+const MULTIPLE_SAMPLES: u32 = 4;
 /// First set of sample dimensions used beside the path along the camera ray; the path's own lie below and are spent by
 /// its first vertices.
 const CAMERA_SETS: u32 = 16;
@@ -115,7 +115,6 @@ impl<'s> Camera<'s> {
             emission: layers.emission,
             transmittance: tau.map(|tau| (-tau).exp()),
             depth: hit.map_or(0.0, |h| h.t),
-            records: 0.0,
         }
     }
 
@@ -155,9 +154,7 @@ impl<'s> Camera<'s> {
             match multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    let (value, records) = self.interpolated(&ray, &flight, cache, sampler);
-                    pixel.multiple = value;
-                    pixel.records = records;
+                    pixel.multiple = self.interpolated(&ray, &flight, cache, sampler);
                 }
                 Multiple::Paths => {
                     pixel.multiple = self.traced(&ray, hit, FirstEvent::Medium, sampler).multiple;
@@ -219,7 +216,7 @@ impl<'s> Camera<'s> {
         flight: &FreeFlight<'_>,
         cache: &Cache<3>,
         sampler: &mut Sampler,
-    ) -> (Vec3, f32) {
+    ) -> Vec3 {
         let media = &self.scene.media;
         let offset = sampler.next_1d();
         let mut sum = Vec3::ZERO;
@@ -242,6 +239,6 @@ impl<'s> Camera<'s> {
         }
         self.lookups.set(self.lookups.get() + looked);
         self.missed.set(self.missed.get() + missed);
-        (sum / MULTIPLE_SAMPLES as f32, looked as f32)
+        sum / MULTIPLE_SAMPLES as f32
     }
 }

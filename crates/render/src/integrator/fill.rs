@@ -16,8 +16,11 @@ use tyndall_transport::free_flight::FreeFlight;
 use tyndall_transport::gather;
 use tyndall_transport::world::{Geometry, Lights};
 
-/// Pixels between the camera rays of each level, coarse to fine.
-const LEVELS: [u32; 4] = [32, 16, 8, 4];
+/// Camera rays along the longer side of the frame on the first level; each level doubles them, at most to one per pixel.
+const FIRST_RAYS: u32 = 16;
+/// Levels end when no more than this share of a new level's points is found without a record: the camera pass then
+/// stretches the nearest ones.
+const GAPS_LEFT: f32 = 0.04;
 /// Points on each camera ray, evenly spread in transmittance.
 const POINTS_PER_RAY: u32 = 8;
 /// Rounds on one level: radii shrink when records come in, and open gaps that the next round closes.
@@ -43,57 +46,86 @@ pub(crate) struct Fill<'s> {
     pub(crate) deadline: Option<Instant>,
 }
 
+/// A filled cache.
+pub(super) struct Filled {
+    pub(super) cache: Cache<3>,
+    /// The pixel through which each record was asked for: column and row.
+    pub(super) pixels: Vec<[u32; 2]>,
+    pub(super) rays: u64,
+}
+
 /// A point on a camera ray that asks for a record.
 #[derive(Clone, Copy)]
 struct Candidate {
     position: Vec3,
     /// Size of a pixel there, in metres.
     footprint: f32,
+    /// Column and row of the pixel it is seen in.
+    pixel: [u32; 2],
 }
 
 impl Fill<'_> {
     /// Computes the records the camera needs.
-    pub(crate) fn run(&self, progress: &dyn Progress) -> (Cache<3>, u64) {
-        let mut cache = Cache::new();
-        let mut rays = 0;
+    pub(super) fn run(&self, progress: &dyn Progress) -> Filled {
+        let mut filled = Filled {
+            cache: Cache::new(),
+            pixels: Vec::new(),
+            rays: 0,
+        };
         let scale = self.view_scale();
-        for (level, &stride) in LEVELS.iter().enumerate() {
+        let strides = strides(self.frame);
+        for (level, &stride) in strides.iter().enumerate() {
             for round in 0..ROUNDS {
-                let fraction = (level as f32 + round as f32 / ROUNDS as f32) / LEVELS.len() as f32;
-                progress.update(Phase::Fill, fraction, cache.len());
-                let missing = self.uncovered(&cache, level as u64, stride);
-                let points = thin(&missing, &cache, scale);
-                if points.is_empty() || self.out_of_time() {
+                let fraction = (level as f32 + round as f32 / ROUNDS as f32) / strides.len() as f32;
+                progress.update(Phase::Fill, fraction, filled.cache.len());
+                let (missing, share) = self.uncovered(&filled.cache, level as u64, stride);
+                if missing.is_empty() || self.out_of_time() || (round == 0 && share < GAPS_LEFT) {
                     break;
                 }
-                let first = cache.len();
-                let done = AtomicUsize::new(0);
-                let computed: Vec<(Option<Record<3>>, u64)> = points
-                    .par_iter()
-                    .enumerate()
-                    .map(|(i, point)| {
-                        let geometry = Counted::new(self.scene);
-                        let record = self.record(&geometry, point, (first + i) as u64, scale);
-                        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-                        progress.update(Phase::Fill, fraction, first + n);
-                        (record, geometry.rays())
-                    })
-                    .collect();
-                rays += computed.iter().map(|(_, n)| n).sum::<u64>();
-                let records = computed
-                    .into_iter()
-                    .filter_map(|(record, _)| record)
-                    .collect();
-                let kept = cache
-                    .insert(records)
-                    .and_then(|()| cache.clamp_radii(RADIUS_SLOPE));
-                debug_assert!(kept.is_ok(), "{kept:?}");
-                if kept.is_err() {
+                let points = thin(&missing, &filled.cache, scale);
+                if !self.compute(&mut filled, &points, scale, progress, fraction) {
                     break;
                 }
             }
         }
-        (cache, rays)
+        filled
+    }
+
+    /// Computes records at `points` and inserts them in order; false where the cache refused them.
+    fn compute(
+        &self,
+        filled: &mut Filled,
+        points: &[Candidate],
+        scale: f32,
+        progress: &dyn Progress,
+        fraction: f32,
+    ) -> bool {
+        let first = filled.cache.len();
+        let done = AtomicUsize::new(0);
+        let computed: Vec<(Option<Record<3>>, u64)> = points
+            .par_iter()
+            .enumerate()
+            .map(|(i, point)| {
+                let geometry = Counted::new(self.scene);
+                let record = self.record(&geometry, point, (first + i) as u64, scale);
+                let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress.update(Phase::Fill, fraction, first + n);
+                (record, geometry.rays())
+            })
+            .collect();
+        filled.rays += computed.iter().map(|(_, n)| n).sum::<u64>();
+        let (records, seen): (Vec<_>, Vec<_>) = computed
+            .into_iter()
+            .zip(points)
+            .filter_map(|((record, _), point)| Some((record?, point.pixel)))
+            .unzip();
+        filled.pixels.extend(seen);
+        let cache = &mut filled.cache;
+        let kept = cache
+            .insert(records)
+            .and_then(|()| cache.clamp_radii(RADIUS_SLOPE));
+        debug_assert!(kept.is_ok(), "{kept:?}");
+        kept.is_ok()
     }
 
     fn out_of_time(&self) -> bool {
@@ -131,14 +163,14 @@ impl Fill<'_> {
         if n > 0.0 { sum / n } else { 1.0 }
     }
 
-    /// Points on the camera rays of one level that no record covers, in a fixed order.
-    fn uncovered(&self, cache: &Cache<3>, level: u64, stride: u32) -> Vec<Candidate> {
+    /// Points on the camera rays of one level that no record covers, in a fixed order, and their share of all points.
+    fn uncovered(&self, cache: &Cache<3>, level: u64, stride: u32) -> (Vec<Candidate>, f32) {
         let [w, h] = self.frame;
         let rows: Vec<u32> = (0..h).step_by(stride as usize).collect();
-        let found: Vec<Vec<Candidate>> = rows
+        let found: Vec<(Vec<Candidate>, usize)> = rows
             .par_iter()
             .map(|&y| {
-                let mut row = Vec::new();
+                let (mut row, mut points) = (Vec::new(), 0);
                 for x in (0..w).step_by(stride as usize) {
                     let index = (level << 40) | (u64::from(y) * u64::from(w) + u64::from(x));
                     let key = Key {
@@ -154,19 +186,23 @@ impl Fill<'_> {
                         w,
                         h,
                     );
-                    self.points_on(&ray, sampler.next_1d(), |candidate| {
+                    self.points_on(&ray, [x, y], sampler.next_1d(), |candidate| {
+                        points += 1;
                         if !cache.covers(candidate.position) {
                             row.push(candidate);
                         }
                     });
                 }
-                row
+                (row, points)
             })
             .collect();
-        found.into_iter().flatten().collect()
+        let points: usize = found.iter().map(|(_, n)| n).sum();
+        let missing: Vec<Candidate> = found.into_iter().flat_map(|(row, _)| row).collect();
+        let share = missing.len() as f32 / points.max(1) as f32;
+        (missing, share)
     }
 
-    fn points_on(&self, ray: &Ray, offset: f32, mut visit: impl FnMut(Candidate)) {
+    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, mut visit: impl FnMut(Candidate)) {
         let world = self.scene.world();
         let t_max = world
             .geometry
@@ -181,6 +217,7 @@ impl Fill<'_> {
                 visit(Candidate {
                     position: ray.at(t),
                     footprint: self.scene.camera.footprint(t, self.frame[1]),
+                    pixel,
                 });
             }
         }
@@ -202,18 +239,20 @@ impl Fill<'_> {
             index,
         };
         let g = gather::multiple(&world, x, self.rays_per_record(), self.max_depth, key);
-        // Lengths over which the field changes: to surfaces, to lamps, a free path, and its own relative gradient.
+        // Lengths over which the field changes: to surfaces, to lamps, to the edge of a medium (where the field falls off
+        // ever faster), a free path, and its own relative gradient.
         let sum: f32 = g.value.element_sum();
         let slope: f32 = g.gradient.iter().map(|d| d.length()).sum();
         let inverse = 1.0 / g.harmonic_mean_distance
             + 1.0 / world.lights.distance_to_point_lights(x)
+            + 0.5 / world.media.distance_to_boundary(x)
             + world.media.at(x).sigma_t.element_sum() / 3.0
             + if sum > 0.0 { slope / sum } else { 0.0 };
         // The log-linear interpolant errs with the square of the radius.
         let radius = (2.0 * self.error.sqrt()).clamp(0.1, 0.5) / inverse;
         let radius = radius
             .min(PAST_SURFACE * g.nearest)
-            .max((2.0 * point.footprint).max(RADIUS_RANGE[0] * scale))
+            .max(point.footprint.max(RADIUS_RANGE[0] * scale))
             .min(RADIUS_RANGE[1] * scale);
         let finite = g.value.is_finite() && g.gradient.iter().all(|d| d.is_finite());
         finite.then_some(Record {
@@ -223,6 +262,13 @@ impl Fill<'_> {
             gradient: g.gradient,
         })
     }
+}
+
+/// Pixels between the camera rays of each level, coarse to fine, the last one 1.
+fn strides(frame: [u32; 2]) -> Vec<u32> {
+    let longest = frame[0].max(frame[1]);
+    let first = (longest / FIRST_RAYS).max(1);
+    (0..=first.ilog2()).rev().map(|level| 1 << level).collect()
 }
 
 /// Drops candidates that an earlier one will probably cover; keeps their order.

@@ -4,6 +4,7 @@
 
 mod camera;
 mod counted;
+mod estimate;
 mod fill;
 
 use crate::error::RenderError;
@@ -13,12 +14,12 @@ use crate::layers::LayerSet;
 use crate::options::{Crop, Depth, Integrator, Phase, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
 use camera::{Camera, Multiple, Tally};
-use fill::Fill;
+use estimate::Estimate;
+use fill::{Fill, Filled};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-use tyndall_cache::Cache;
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::Scene;
 use tyndall_transport::world::Lights;
@@ -30,6 +31,10 @@ const MOST_SAMPLES: u32 = 1 << 20;
 /// Share of the target error that noise may take when records are interpolated; the rest is left to interpolation
 /// (added in squares, 0.8² + 0.6² = 1).
 const NOISE_SHARE: f64 = 0.8;
+
+/// Shares of a time limit after which the fill and the samples end; the rest goes to the estimate of the error.
+const FILL_DEADLINE: f64 = 0.4;
+const RENDER_DEADLINE: f64 = 0.8;
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -110,12 +115,15 @@ impl<'s> Run<'s> {
         }
     }
 
-    fn deadline(&self) -> Option<Instant> {
-        self.options.time_limit.map(|limit| self.start + limit)
+    /// When a share of the time limit is spent.
+    fn deadline(&self, share: f64) -> Option<Instant> {
+        let limit = self.options.time_limit?;
+        self.start.checked_add(limit.mul_f64(share))
     }
 
     fn out_of_time(&self) -> bool {
-        self.deadline().is_some_and(|d| Instant::now() >= d)
+        self.deadline(RENDER_DEADLINE)
+            .is_some_and(|d| Instant::now() >= d)
     }
 
     fn render(&self) -> Outcome {
@@ -129,28 +137,35 @@ impl<'s> Run<'s> {
         let mut film = Film::new(self.frame, self.crop, layers);
 
         let way = self.way(&mut notes);
-        let cache = match way {
-            Way::Records => {
-                let (cache, rays) = self.fill();
-                stats.rays += rays;
-                stats
-                    .records
-                    .insert("multiple".to_owned(), cache.len() as u64);
-                Some(cache)
-            }
-            _ => None,
-        };
+        let filled = (way == Way::Records).then(|| self.fill());
+        if let Some(filled) = &filled {
+            stats.rays += filled.rays;
+            let count = filled.cache.len() as u64;
+            stats.records.insert("multiple".to_owned(), count);
+        }
         stats.fill_s = self.start.elapsed().as_secs_f64();
 
         let rendering = Instant::now();
-        let multiple = match (&cache, way) {
-            (Some(cache), _) => Multiple::Records(cache),
+        let multiple = match (&filled, way) {
+            (Some(filled), _) => Multiple::Records(&filled.cache),
             (None, Way::Paths) => Multiple::Paths,
             (None, _) => Multiple::None,
         };
         let (tally, timed_out) = self.sample(&mut film, &multiple);
         stats.render_s = rendering.elapsed().as_secs_f64();
-        stats.rays += tally.rays;
+
+        let estimating = Instant::now();
+        let estimate = Estimate {
+            scene: self.scene,
+            frame: self.frame,
+            max_depth: self.max_depth,
+            seed: self.options.seed,
+        };
+        let (error, estimate_tally) = estimate.run(&film, self.progress);
+        stats.estimated_error = error;
+        stats.estimate_s = estimating.elapsed().as_secs_f64();
+
+        stats.rays += tally.rays + estimate_tally.rays;
         stats.lookups = tally.lookups;
         stats.lookups_missed = tally.missed;
         stats.spp = film.mean_samples();
@@ -172,8 +187,12 @@ impl<'s> Run<'s> {
                 "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
             }
         };
+        let mut image = film.image();
+        if let (Some(filled), Some(points)) = (&filled, image.channels.get_mut("records")) {
+            mark_records(&filled.pixels, self.crop, points);
+        }
         Outcome {
-            image: film.image(),
+            image,
             stats,
             notes,
             timed_out,
@@ -203,15 +222,14 @@ impl<'s> Run<'s> {
     }
 
     /// Fills the cache for the whole frame, whatever the crop, so that a crop shows the pixels of the full image.
-    fn fill(&self) -> (Cache<3>, u64) {
+    fn fill(&self) -> Filled {
         let fill = Fill {
             scene: self.scene,
             frame: self.frame,
             max_depth: self.max_depth,
             seed: self.options.seed,
             error: self.error,
-            // A fill that took all the time would leave no image.
-            deadline: self.options.time_limit.map(|limit| self.start + limit / 2),
+            deadline: self.deadline(FILL_DEADLINE),
         };
         fill.run(self.progress)
     }
@@ -320,6 +338,17 @@ enum Way {
     NoMultiple,
     Records,
     Paths,
+}
+
+/// Counts the records asked for through each pixel of `crop`.
+fn mark_records(pixels: &[[u32; 2]], crop: Crop, counts: &mut [f32]) {
+    for &[x, y] in pixels {
+        let inside =
+            x >= crop.x && y >= crop.y && x - crop.x < crop.width && y - crop.y < crop.height;
+        if inside {
+            counts[((y - crop.y) * crop.width + (x - crop.x)) as usize] += 1.0;
+        }
+    }
 }
 
 /// Samples a pass may take when `taken` have been taken.

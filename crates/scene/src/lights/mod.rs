@@ -245,6 +245,13 @@ impl Lights for LightSet {
         }
     }
 
+    fn grad_ln_intensity(&self, light: usize, p: Vec3) -> Vec3 {
+        match self.lights.get(light) {
+            Some(Light::Spot(spot)) => spot.grad_ln_falloff(p),
+            _ => Vec3::ZERO,
+        }
+    }
+
     fn distance_to_point_lights(&self, p: Vec3) -> f32 {
         self.point_positions
             .iter()

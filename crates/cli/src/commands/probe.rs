@@ -1,0 +1,54 @@
+//! `tyndall probe`: scattered light at one point of a scene.
+
+use crate::args::ProbeArgs;
+use crate::error::CliError;
+use crate::output;
+use tyndall_render::probe::{Part, Probe, ProbeOptions, probe};
+
+pub(super) fn run(args: &ProbeArgs) -> Result<(), CliError> {
+    let options = ProbeOptions {
+        at: args.at.into(),
+        towards: args.dir.map(Into::into),
+        samples: args.samples,
+        integrator: args.integrator.0,
+        seed: 0,
+    };
+    let scene = tyndall_scene::load(&args.scene, &args.source.load_options())?;
+    output::warn(&scene.warnings);
+    let found = probe(&scene, &options)?;
+    if args.json {
+        output::print_json(&found)
+    } else {
+        output::print(&text(&found))
+    }
+}
+
+fn text(found: &Probe) -> String {
+    let mut lines = Vec::new();
+    for (name, part) in [("single", &found.single), ("multiple", &found.multiple)] {
+        lines.extend(part_lines(name, part));
+    }
+    lines.push(format!("σt       {} /m", triple(found.sigma_t)));
+    lines.push(format!("σs       {} /m", triple(found.sigma_s)));
+    lines.join("\n")
+}
+
+fn part_lines(name: &str, part: &Part) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{name:<8} {} ± {} W/(m² sr)",
+        triple(part.value),
+        triple(part.stderr)
+    )];
+    for (c, channel) in ["red", "green", "blue"].iter().enumerate() {
+        lines.push(format!(
+            "  gradient of {channel:<6} {} ± {} /m",
+            triple(part.gradient[c]),
+            triple(part.gradient_stderr[c])
+        ));
+    }
+    lines
+}
+
+fn triple(v: [f32; 3]) -> String {
+    format!("({:.5e}, {:.5e}, {:.5e})", v[0], v[1], v[2])
+}

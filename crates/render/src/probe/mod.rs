@@ -1,0 +1,181 @@
+//! Scattered light at one point: value and gradient of single and multiple scattering, with standard errors.
+//!
+//! Single scattering is sampled towards the lights and by the phase function, with exact derivatives of every sample; multiple
+//! scattering is that of one fresh record, or of paths and finite differences where the ground truth is asked for.
+
+mod paths;
+mod single;
+
+pub use paths::by_paths;
+pub use single::single;
+
+use crate::options::Integrator;
+use glam::Vec3;
+use serde::Serialize;
+use tyndall_math::stats::Welford;
+use tyndall_math::{Key, Purpose};
+use tyndall_scene::Scene;
+use tyndall_transport::gather;
+
+/// What to measure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeOptions {
+    /// The point, in metres.
+    pub at: Vec3,
+    /// The direction in which the scattered light leaves, of any length; may be left out where scattering is isotropic.
+    pub towards: Option<Vec3>,
+    /// Gather directions, or paths.
+    pub samples: u32,
+    /// How multiple scattering is found.
+    pub integrator: Integrator,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+/// Why a probe cannot be answered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProbeError {
+    /// Nothing to average over.
+    #[error("--samples is 0, but it must be at least 1")]
+    NoSamples,
+    /// The point is not a place.
+    #[error("--at is ({}, {}, {}), but all of its numbers must be finite", .0.x, .0.y, .0.z)]
+    Point(Vec3),
+    /// The direction has no direction.
+    #[error("--dir is ({}, {}, {}), but it must have a finite length above 0", .0.x, .0.y, .0.z)]
+    Direction(Vec3),
+    /// The result depends on a direction that was not given.
+    #[error(
+        "the media of this scene do not scatter equally in all directions: give the direction in which the light leaves with --dir X,Y,Z"
+    )]
+    DirectionMissing,
+}
+
+/// In-scattered radiance ∫ p L dω, without the scattering coefficient, and how it changes with the point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Part {
+    /// Red, green, blue, W/(m² sr).
+    pub value: [f32; 3],
+    /// Standard error of the value.
+    pub stderr: [f32; 3],
+    /// ∂/∂x, ∂/∂y, ∂/∂z per metre, for red, green and blue.
+    pub gradient: [[f32; 3]; 3],
+    /// Standard error of the gradient.
+    pub gradient_stderr: [[f32; 3]; 3],
+}
+
+/// What `tyndall probe` tells.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Probe {
+    /// Light straight from emitters.
+    pub single: Part,
+    /// Light that was scattered or reflected before, or that media emit.
+    pub multiple: Part,
+    /// Extinction at the point, per metre.
+    pub sigma_t: [f32; 3],
+    /// Scattering at the point, per metre.
+    pub sigma_s: [f32; 3],
+}
+
+/// Measures scattered light in `scene`. Outside of media the light that an isotropic medium would scatter there is told.
+///
+/// # Errors
+/// A point or direction that is none, no samples, or a missing direction where scattering depends on it.
+pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError> {
+    if options.samples == 0 {
+        return Err(ProbeError::NoSamples);
+    }
+    if !options.at.is_finite() {
+        return Err(ProbeError::Point(options.at));
+    }
+    let towards = match options.towards {
+        Some(direction) => Some(
+            direction
+                .try_normalize()
+                .ok_or(ProbeError::Direction(direction))?,
+        ),
+        None if scene.media.is_isotropic() => None,
+        None => return Err(ProbeError::DirectionMissing),
+    };
+    let world = scene.world();
+    let max_depth = scene.settings.max_depth;
+    let samples = options.samples as usize;
+    let key = Key {
+        seed: options.seed,
+        purpose: Purpose::Probe,
+        index: 0,
+    };
+    let (single, multiple) = match options.integrator {
+        Integrator::Path => by_paths(&world, options.at, towards, samples, max_depth, key),
+        Integrator::Cache => {
+            let g = gather::multiple_towards(&world, options.at, towards, samples, max_depth, key);
+            let multiple = Part {
+                value: g.value.to_array(),
+                stderr: g.value_error.to_array(),
+                gradient: g.gradient.map(Into::into),
+                gradient_stderr: g.gradient_error.map(Into::into),
+            };
+            (single(&world, options.at, towards, samples, key), multiple)
+        }
+    };
+    let medium = scene.media.at(options.at);
+    Ok(Probe {
+        single,
+        multiple,
+        sigma_t: medium.sigma_t.to_array(),
+        sigma_s: medium.sigma_s.to_array(),
+    })
+}
+
+/// Independent batches from whose spread standard errors are taken; within one, samples are stratified.
+const BATCHES: usize = 32;
+
+/// Value and gradient of one sample.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sample {
+    value: Vec3,
+    gradient: [Vec3; 3],
+}
+
+/// Averages `samples` samples of several parts; `sample` is given the key of the batch and the number in it.
+fn average<const N: usize>(
+    samples: usize,
+    key: Key,
+    mut sample: impl FnMut(Key, u64) -> [Sample; N],
+) -> [Part; N] {
+    let batches = samples.clamp(1, BATCHES);
+    let mut spread = [[Welford::new(); 12]; N];
+    for batch in 0..batches {
+        let key = Key {
+            index: (key.index << 8) | batch as u64,
+            ..key
+        };
+        // Batches differ by at most one sample: samples are dealt out in turn.
+        let n = (samples - batch).div_ceil(batches).max(1);
+        let mut sums = [[0.0f64; 12]; N];
+        for i in 0..n {
+            for (sum, part) in sums.iter_mut().zip(sample(key, i as u64)) {
+                let numbers = [part.value].into_iter().chain(part.gradient);
+                for (sum, x) in sum.iter_mut().zip(numbers.flat_map(|v| v.to_array())) {
+                    *sum += f64::from(x);
+                }
+            }
+        }
+        for (spread, sum) in spread.iter_mut().flatten().zip(sums.iter().flatten()) {
+            spread.push(sum / n as f64);
+        }
+    }
+    spread.map(|numbers| {
+        let triple =
+            |i: usize, f: fn(&Welford) -> f64| [0, 1, 2].map(|c| f(&numbers[3 * i + c]) as f32);
+        Part {
+            value: triple(0, Welford::mean),
+            stderr: triple(0, Welford::standard_error),
+            gradient: [1, 2, 3].map(|i| triple(i, Welford::mean)),
+            gradient_stderr: [1, 2, 3].map(|i| triple(i, Welford::standard_error)),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+//! Replicates of pixels and records, whose spread is the standard error.
+//!
+//! Samples within a replicate are stratified against each other; replicates are independent, so that z is what it says.
+
+use super::world::{Lamps, Solids};
+use super::{Budget, Row};
+use crate::probe;
+use glam::Vec3;
+use tyndall_math::stats::Welford;
+use tyndall_math::{Key, Purpose, Ray, Sampler};
+use tyndall_transport::gather;
+use tyndall_transport::layers::LayerVisitor;
+use tyndall_transport::path::{FirstEvent, Start, trace};
+
+/// The world of the benchmarks.
+pub(super) type World<'a> = tyndall_transport::World<'a, Solids, Lamps>;
+
+/// Independent replicates of each number.
+const REPLICATES: usize = 256;
+/// Gather directions of each replicate of a record.
+const RECORD_RAYS: usize = 512;
+/// Relative error of f32 path tracing: positions, optical depths and sums of some ten factors.
+pub(super) const ROUNDING: f64 = 3e-5;
+/// The same for gradients, which are sums of terms of both signs.
+const GRADIENT_ROUNDING: f64 = 3e-4;
+
+impl Budget {
+    fn key(&self, replicate: usize) -> Key {
+        Key {
+            seed: self.seed,
+            purpose: Purpose::Probe,
+            index: (self.task << 32) | replicate as u64,
+        }
+    }
+}
+
+/// Colour channels to look at: their mean, or one of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Channel {
+    Mean,
+    One(usize),
+}
+
+impl Channel {
+    fn of(self, v: Vec3) -> f64 {
+        match self {
+            Channel::Mean => f64::from(v.element_sum()) / 3.0,
+            Channel::One(c) => f64::from(v[c]),
+        }
+    }
+}
+
+/// Radiance of paths that start along `ray` of two random numbers, from about `samples` paths in the full run.
+pub(super) fn pixel(
+    world: &World<'_>,
+    budget: &Budget,
+    samples: usize,
+    max_depth: Option<u32>,
+    channel: Channel,
+    ray: impl Fn([f32; 2]) -> Ray,
+) -> Welford {
+    let n = (budget.samples(samples) / REPLICATES).max(1);
+    let mut replicates = Welford::new();
+    for replicate in 0..REPLICATES {
+        let mut sum = 0.0;
+        for i in 0..n {
+            let mut sampler = Sampler::new(budget.key(replicate), i as u64);
+            let start = Start {
+                ray: ray(sampler.next_2d()),
+                hit: None,
+                first: FirstEvent::Any,
+                max_depth,
+            };
+            let mut visitor = LayerVisitor::default();
+            trace(world, &start, &mut sampler, &mut visitor);
+            sum += channel.of(visitor.layers.beauty());
+        }
+        replicates.push(sum / n as f64);
+    }
+    replicates
+}
+
+/// Mean and standard error.
+pub(super) fn estimate(replicates: &Welford) -> (f64, f64) {
+    (replicates.mean(), replicates.standard_error())
+}
+
+/// What light to look at in a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Light {
+    /// Light straight from emitters.
+    Single,
+    /// All other light.
+    Multiple,
+    /// All light.
+    All,
+}
+
+/// A point at which light is gathered, and its exact value and gradient.
+pub(super) struct Point {
+    pub(super) x: Vec3,
+    /// Towards the eye, `None` to weight all directions alike.
+    pub(super) towards: Option<Vec3>,
+    pub(super) light: Light,
+    pub(super) value: f64,
+    pub(super) gradient: [f64; 3],
+}
+
+/// The rows of one point: value, gradient along the exact gradient, and across it.
+///
+/// `replicates` records of 512 directions are taken in the full run; single scattering takes as many samples.
+pub(super) fn point_rows(
+    world: &World<'_>,
+    budget: &Budget,
+    (family, name): (&'static str, &str),
+    replicates: usize,
+    point: &Point,
+) -> Vec<Row> {
+    let exact = glam::DVec3::from(point.gradient);
+    let along = exact.normalize_or(glam::DVec3::Y);
+    let across = along.any_orthonormal_vector();
+    let mut spread = [Welford::new(); 3];
+    // Fewer would leave the tails of the spread too uncertain.
+    for replicate in 0..budget.samples(replicates).max(32) {
+        let (value, gradient) = measure(world, budget.key(replicate), point);
+        let gradient = glam::DVec3::from(gradient);
+        let numbers = [value, gradient.dot(along), gradient.dot(across)];
+        for (spread, number) in spread.iter_mut().zip(numbers) {
+            spread.push(number);
+        }
+    }
+    let [value, slope, side] = &spread;
+    let rounding = GRADIENT_ROUNDING * exact.length().max(point.value);
+    vec![
+        Row::random(
+            family,
+            format!("{name}: value"),
+            estimate(value),
+            point.value,
+            ROUNDING * point.value,
+        ),
+        Row::random(
+            family,
+            format!("{name}: gradient"),
+            estimate(slope),
+            exact.length(),
+            rounding,
+        ),
+        Row::random(
+            family,
+            format!("{name}: gradient across"),
+            estimate(side),
+            0.0,
+            rounding,
+        ),
+    ]
+}
+
+/// Value and gradient at `point`, means of the colour channels.
+fn measure(world: &World<'_>, key: Key, point: &Point) -> (f64, [f64; 3]) {
+    let (mut value, mut gradient) = (0.0, [0.0; 3]);
+    let mut add = |part: Vec3, slopes: [Vec3; 3]| {
+        value += Channel::Mean.of(part);
+        for (axis, sum) in gradient.iter_mut().enumerate() {
+            *sum += Channel::Mean.of(Vec3::from(slopes.map(|s| s[axis])));
+        }
+    };
+    if point.light != Light::Single {
+        let g = gather::multiple_towards(world, point.x, point.towards, RECORD_RAYS, None, key);
+        add(g.value, g.gradient);
+    }
+    if point.light != Light::Multiple {
+        let part = probe::single(world, point.x, point.towards, RECORD_RAYS, key);
+        add(part.value.into(), part.gradient.map(Vec3::from));
+    }
+    (value, gradient)
+}
