@@ -80,6 +80,20 @@ impl Sampler {
         }
     }
 
+    /// The numbers of the same sample for another part of its work: stratified alike, independent of this sampler's own.
+    pub fn branch(&self, part: u64) -> Self {
+        let seed = mix(self.seed ^ mix(part));
+        let mut stream = self.stream.clone();
+        Self {
+            seed,
+            sample: self.sample,
+            set: 0,
+            buffer: [0.0; 4],
+            used: 4,
+            stream: Pcg32::new(u64::from(stream.next_u32()) | (seed << 32), seed | 1),
+        }
+    }
+
     /// Starts a fresh set of four dimensions, so that what a path draws at a vertex does not shift what it draws at the next.
     pub fn start_set(&mut self, set: u32) {
         self.set = set;
@@ -134,6 +148,15 @@ mod tests {
         assert_ne!(draw(KEY, 5), draw(KEY, 6));
         assert_ne!(draw(KEY, 5), draw(Key { index: 4, ..KEY }, 5));
         assert_ne!(draw(KEY, 5), draw(KEY, 5 + 65_536));
+    }
+
+    #[test]
+    fn branches_of_a_sample_draw_numbers_of_their_own() {
+        let sampler = Sampler::new(KEY, 9);
+        let draw = |mut s: Sampler| (0..200).map(|_| s.next_1d()).collect::<Vec<_>>();
+        assert_ne!(draw(sampler.clone()), draw(sampler.branch(1)));
+        assert_ne!(draw(sampler.branch(1)), draw(sampler.branch(2)));
+        assert_eq!(draw(sampler.branch(1)), draw(sampler.branch(1)));
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub struct MediumPoint<'a> {
 pub struct PhaseValue {
     /// Σ σs p / Σ σs over the media, per steradian.
     pub value: Vec3,
-    /// Its derivative with respect to the cosine of scattering μ = −w_i · w_o.
+    /// Its derivative with respect to the cosine of scattering μ = −`w_i` · `w_o`.
     pub slope: Vec3,
     /// Its gradient per metre and channel when the point moves and the directions stay: media of different phase
     /// functions change their shares.

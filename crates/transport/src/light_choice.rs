@@ -1,7 +1,8 @@
 //! One light of many, chosen by what it could bring.
 //!
 //! Every light's unoccluded, unattenuated contribution is estimated, damped by the fog on the way, and one is picked in
-//! proportion. The estimate steers the choice only; it never enters a result.
+//! proportion. The estimate steers the choice only; it never enters a result, and a small even share keeps every light in
+//! reach of the choice where the estimate is wrong.
 
 use crate::world::Lights;
 use glam::Vec3;
@@ -15,8 +16,11 @@ pub struct LightChoice {
     cumulative: SmallVec<[f32; 8]>,
 }
 
-/// Optical depth beyond which a light's damping is no longer told apart: it must stay reachable.
-pub(crate) const DEEPEST: f32 = 20.0;
+/// Optical depth beyond which a light's damping is no longer told apart: the extinction at one place says little about a
+/// long way.
+pub(crate) const DEEPEST: f32 = 6.0;
+/// Share of choices spread evenly over all lights.
+const EVEN_SHARE: f32 = 0.02;
 
 impl LightChoice {
     /// Chances at the point `p`, on a surface with `normal` or in a medium.
@@ -66,32 +70,42 @@ impl LightChoice {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    /// Picks a light; returns it with its chance.
+    /// Picks a light; returns it with its chance. `None` where there are no lights.
     pub fn sample(&self, u: f32) -> Option<(usize, f32)> {
-        let total = self.total();
-        if total <= 0.0 {
-            return None;
+        let count = self.cumulative.len();
+        let last = count.checked_sub(1)?;
+        let share = self.even_share();
+        let light = if u < share {
+            (u / share * count as f32) as usize
+        } else {
+            let target = (u - share) / (1.0 - share) * self.total();
+            self.cumulative.partition_point(|&c| c <= target)
         }
-        let target = u * total;
-        let light = self
-            .cumulative
-            .partition_point(|&c| c <= target)
-            .min(self.cumulative.len() - 1);
-        let pdf = self.pdf(light);
-        (pdf > 0.0).then_some((light, pdf))
+        .min(last);
+        Some((light, self.pdf(light)))
     }
 
     /// Chance of picking `light`.
     pub fn pdf(&self, light: usize) -> f32 {
-        let total = self.total();
-        if total <= 0.0 {
-            return 0.0;
+        let share = self.even_share();
+        let even = share / self.cumulative.len() as f32;
+        if share >= 1.0 {
+            return even;
         }
         let below = if light == 0 {
             0.0
         } else {
             self.cumulative[light - 1]
         };
-        (self.cumulative[light] - below) / total
+        even + (1.0 - share) * (self.cumulative[light] - below) / self.total()
+    }
+
+    /// All of the choices where no light seems to arrive, none where there is one light alone.
+    fn even_share(&self) -> f32 {
+        match self.cumulative.len() {
+            _ if self.total() <= 0.0 => 1.0,
+            1 => 0.0,
+            _ => EVEN_SHARE,
+        }
     }
 }

@@ -12,7 +12,8 @@ use tyndall_media::MediumPoint;
 
 /// Share of equiangular samples where the light is near enough to have a place.
 const EQUIANGULAR_SHARE: f32 = 0.5;
-/// The light is chosen for the part of the segment that lets through more than e⁻⁸ of the light.
+/// On an endless segment the light is chosen for the part that lets through more than e⁻⁸ of the light in the clearest
+/// channel.
 const CHOICE_DEPTH: f32 = 8.0;
 
 /// Samples single scattering on one segment.
@@ -49,12 +50,11 @@ impl<'m> SegmentLight<'m> {
             return None;
         }
         let (start, end) = flight.segment().range();
-        let total = flight.segment().total();
-        let densest = total.max_position();
-        let end = flight
-            .segment()
-            .distance_at(densest, (0.999 * total[densest]).min(CHOICE_DEPTH))
-            .unwrap_or(end);
+        let end = if end.is_finite() {
+            end
+        } else {
+            finite_end(flight)
+        };
         let length = end - start;
         let depth = flight.segment().optical_depth(end).element_sum() / 3.0;
         let from = Ray::new(ray.at(start), ray.direction);
@@ -149,6 +149,18 @@ impl<'m> SegmentLight<'m> {
             pdf,
         })
     }
+}
+
+/// A distance on an endless segment beyond which little light is scattered in any channel.
+fn finite_end(flight: &FreeFlight<'_>) -> f32 {
+    let total = flight.segment().total();
+    (0..3)
+        .filter(|&c| total[c] > 0.0)
+        .filter_map(|c| {
+            let depth = (0.999 * total[c]).min(CHOICE_DEPTH);
+            flight.segment().distance_at(c, depth)
+        })
+        .fold(flight.segment().range().0, f32::max)
 }
 
 /// Shadow rays end this share of the distance before the light, so that the light's own surface does not shade it.

@@ -8,8 +8,12 @@
 //! Where scattering is not isotropic the directions at a vertex turn when its neighbours move otherwise than itself, and
 //! ∂ ln p(μ) joins the sum; towards the eye the direction stays.
 //!
-//! Derivation: change of variables y → y + α(y) δ in every medium vertex and the divergence theorem; there is no boundary
-//! term because α f vanishes where f jumps. With the vertices moving alike, the 1/r terms of neighbouring vertices cancel
+//! Left out, so that gradients miss them: shadow edges (visibility is taken as constant), boundaries of media nearer than the
+//! ball's least radius, the turning lobes of surfaces that are not Lambertian and of spot lights, and, for light that media
+//! emit, density profiles of an emission unlike the scattering's.
+//!
+//! Derivation: change of variables y → y + α(y) δ in every medium vertex and the divergence theorem; where f is smooth within
+//! the ball there is no boundary term, because α vanishes at its rim. With the vertices moving alike, the 1/r terms of neighbouring vertices cancel
 //! (|α(y) − α(y')| ≤ Lip(α) |y − y'|).
 
 use crate::path::{Source, Vertex, Visitor};
@@ -32,7 +36,7 @@ struct End {
 #[derive(Clone, Copy)]
 struct Leaving {
     w_o: Vec3,
-    /// (α of the vertex before − α) over the distance: ∂w_o = (1 − w_o w_oᵀ) rate.
+    /// (α of the vertex before − α) over the distance: `∂w_o = (1 − w_o w_oᵀ) rate`.
     rate: f32,
 }
 
@@ -100,7 +104,7 @@ impl<'m> WarpVisitor<'m> {
     }
 
     /// Adds what turning directions do to the phase function at `at`, where light comes from the unit direction `w_i` that
-    /// turns at `rate`: ∂μ = −(w_o − (w_o·w_i) w_i) rate − (w_i − (w_o·w_i) w_o) rateₒ.
+    /// turns at `rate`: `∂μ = −(w_o − (w_o·w_i) w_i) rate − (w_i − (w_o·w_i) w_o) rateₒ`.
     fn turn(
         &self,
         log_gradient: &mut [Vec3; 3],

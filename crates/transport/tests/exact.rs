@@ -119,7 +119,7 @@ fn all_orders_beside_a_lamp_in_endless_fog_are_exact() {
             &world,
             Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X),
             None,
-            60_000,
+            100_000,
         );
         estimate.check(
             &format!("pixel c {albedo} t0 {t0} h {h}"),
@@ -152,6 +152,79 @@ fn spheres_under_a_uniform_sky_are_exact() {
         let (_, estimate) = pixel(&world, ray, None, 80_000);
         estimate.check(&format!("sphere R {radius} c {albedo}"), exact, 1e-2, 1e-5);
     }
+}
+
+#[test]
+fn a_lamp_and_a_sky_add_up() {
+    // E3.6 (a) and (b) by superposition: lights chosen by importance must not favour one another. R = 1, c = 0.9, b = 0.5 R.
+    for power in [4.0f32, 40.0, 400.0] {
+        let lamps = Lamps::points(&[(Vec3::ZERO, 0.25 * power / PI)]).with_sky(1.0);
+        let media = fog(1.0, 0.9, sphere(1.0), PhaseFunction::Isotropic);
+        let world = World {
+            geometry: &OPEN,
+            lights: &lamps,
+            media: &media,
+        };
+        let ray = Ray::new(Vec3::new(-2.0, 0.5, 0.0), Vec3::X);
+        let (_, estimate) = pixel(&world, ray, None, 60_000);
+        let exact = 0.850197215 + 0.0144271722 * f64::from(power);
+        estimate.check(&format!("lamp of {power} W under a sky"), exact, 1e-2, 1e-4);
+    }
+}
+
+#[test]
+fn equal_lamps_in_one_place_add_up_in_a_room_with_walls() {
+    // E3.7, R = 1, c = 0.9, ρ = 0.5: seven lamps share the power of one. Surfaces, media and roulette all choose lights.
+    let lamps = Lamps::points(&[(Vec3::ZERO, 0.25 / (7.0 * PI)); 7]);
+    let room = Room {
+        radius: 1.0,
+        reflectance: 0.5,
+        emission: 0.0,
+    };
+    let media = fog(1.0, 0.9, sphere(1.0), PhaseFunction::Isotropic);
+    let world = World {
+        geometry: &room,
+        lights: &lamps,
+        media: &media,
+    };
+    let ray = Ray::new(Vec3::new(-0.866 * 0.9999, 0.5 * 0.9999, 0.0), Vec3::X);
+    let (_, estimate) = pixel(&world, ray, None, 40_000);
+    estimate.check("seven lamps in a room", 0.0312182537, 2e-2, 3e-4);
+}
+
+#[test]
+fn unequal_lamps_apart_add_up_in_a_room_with_walls() {
+    let places = [
+        (Vec3::new(0.5, 0.1, 0.0), 1.0),
+        (Vec3::new(-0.4, 0.3, 0.5), 0.05),
+        (Vec3::new(0.0, -0.6, -0.2), 0.3),
+    ];
+    let room = Room {
+        radius: 1.0,
+        reflectance: 0.7,
+        emission: 0.0,
+    };
+    let media = fog(1.5, 0.8, sphere(1.0), PhaseFunction::Isotropic);
+    let seen = |lamps: &[(Vec3, f32)]| {
+        let lamps = Lamps::points(lamps);
+        let world = World {
+            geometry: &room,
+            lights: &lamps,
+            media: &media,
+        };
+        let ray = Ray::new(Vec3::new(-0.866 * 0.9999, 0.5 * 0.9999, 0.0), Vec3::X);
+        pixel(&world, ray, None, 40_000).1
+    };
+    let all = seen(&places);
+    let single: Vec<Estimate> = places.iter().map(|lamp| seen(&[*lamp])).collect();
+    let sum: f64 = single.iter().map(Estimate::mean).sum();
+    let error = single
+        .iter()
+        .map(Estimate::error)
+        .fold(all.error(), f64::hypot);
+    println!("together {:.5}, apart {sum:.5} ± {error:.5}", all.mean());
+    assert!((all.mean() - sum).abs() < 4.5 * error);
+    assert!(error < 0.03 * sum);
 }
 
 #[test]

@@ -21,9 +21,14 @@ use tyndall_transport::world::{Geometry, SurfaceHit, World};
 const SINGLE_SAMPLES: u32 = 2;
 /// Lookups of multiple scattering along each camera ray.
 const MULTIPLE_SAMPLES: u32 = 4;
-/// First set of sample dimensions used beside the path along the camera ray; the path's own lie below and are spent by
-/// its first vertices.
-const CAMERA_SETS: u32 = 16;
+/// Parts of a camera sample's work beside the path behind the first surface; each has numbers of its own.
+const FOG_PART: u64 = 1;
+const PATHS_PART: u64 = 2;
+
+/// Scattering events that light of the `multiple` layer has had at least: media's own emission needs only the last.
+pub(crate) fn least_multiple_depth(scene: &Scene) -> u32 {
+    if scene.media.emits() { 1 } else { 2 }
+}
 
 /// How multiple scattering is found along camera rays.
 pub(crate) enum Multiple<'c> {
@@ -51,6 +56,8 @@ pub(crate) struct Tally {
     pub(crate) rays: u64,
     pub(crate) lookups: u64,
     pub(crate) missed: u64,
+    /// Samples that were not finite, and were left out.
+    pub(crate) dropped: u64,
 }
 
 impl Tally {
@@ -58,6 +65,7 @@ impl Tally {
         self.rays += other.rays;
         self.lookups += other.lookups;
         self.missed += other.missed;
+        self.dropped += other.dropped;
     }
 }
 
@@ -78,6 +86,7 @@ impl<'s> Camera<'s> {
             rays: self.geometry.rays(),
             lookups: self.lookups.get(),
             missed: self.missed.get(),
+            dropped: 0,
         }
     }
 
@@ -140,7 +149,8 @@ impl<'s> Camera<'s> {
         if flight.segment().is_empty() {
             return pixel;
         }
-        sampler.start_set(CAMERA_SETS);
+        let mut paths = sampler.branch(PATHS_PART);
+        let sampler = &mut sampler.branch(FOG_PART);
         if let Some(e) = emission::sample(&world, &ray, &flight, sampler.next_1d()) {
             pixel.emission = e.value;
         }
@@ -150,14 +160,16 @@ impl<'s> Camera<'s> {
         if self.may_scatter(1) {
             pixel.single = self.single(&world, &ray, &flight, sampler);
         }
-        if self.may_scatter(2) {
+        if self.may_scatter(least_multiple_depth(self.scene)) {
             match multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
                     pixel.multiple = self.interpolated(&ray, &flight, cache, sampler);
                 }
                 Multiple::Paths => {
-                    pixel.multiple = self.traced(&ray, hit, FirstEvent::Medium, sampler).multiple;
+                    pixel.multiple = self
+                        .traced(&ray, hit, FirstEvent::Medium, &mut paths)
+                        .multiple;
                 }
             }
         }
@@ -198,11 +210,12 @@ impl<'s> Camera<'s> {
             return Vec3::ZERO;
         };
         let mut sum = Vec3::ZERO;
+        // One offset for all samples of the ray: their distances are evenly spread.
+        let offset = sampler.next_1d();
         for i in 0..SINGLE_SAMPLES {
-            let [u, v] = sampler.next_2d();
+            let v = (offset + i as f32 / SINGLE_SAMPLES as f32).fract();
+            let u = sampler.next_1d();
             let w = sampler.next_2d();
-            // The pixel's samples stratify u, v, w; along one ray the distances are stratified too.
-            let v = (v + i as f32 / SINGLE_SAMPLES as f32).fract();
             if let Some(s) = lights.sample(world, u, v, w) {
                 sum += s.value;
             }

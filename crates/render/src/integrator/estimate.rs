@@ -11,13 +11,14 @@ use crate::stats::ErrorEstimate;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::Scene;
 
-/// Pixels evaluated.
-const PIXELS: usize = 1024;
-/// Share of the image's samples that the evaluations may take.
+/// Most pixels evaluated.
+const MOST_PIXELS: usize = 1024;
+/// Share of the image's samples that the evaluations may take, where [`SAMPLES`] leave the choice.
 const SHARE: f64 = 0.25;
 /// Fewest and most samples of one evaluation.
 const SAMPLES: [u64; 2] = [4, 4096];
@@ -30,6 +31,8 @@ pub(super) struct Estimate<'s> {
     pub(super) frame: [u32; 2],
     pub(super) max_depth: Option<u32>,
     pub(super) seed: u64,
+    /// When to stop with the pixels evaluated by then.
+    pub(super) deadline: Option<Instant>,
 }
 
 /// One pixel's terms, means over colour channels.
@@ -41,7 +44,9 @@ struct Term {
 }
 
 impl Estimate<'_> {
-    /// Measures the error of `film`'s image; `None` where its colour is black throughout.
+    /// Measures the error of `film`'s image; `None` where it is black throughout or time is up.
+    ///
+    /// After the deadline no pixel is begun: like the number of samples, this number then depends on the machine.
     pub(super) fn run(
         &self,
         film: &Film,
@@ -52,12 +57,16 @@ impl Estimate<'_> {
         let colour = film.colour();
         let weights = weights(&colour.each_ref().map(|c| median_5x5(c, width, height)));
         let budget = film.mean_samples() * (width * height) as f64 * SHARE;
-        let samples = ((budget / (2.0 * PIXELS as f64)) as u64).clamp(SAMPLES[0], SAMPLES[1]);
+        let pixels = MOST_PIXELS.min(width * height);
+        let samples = ((budget / (2.0 * pixels as f64)) as u64).clamp(SAMPLES[0], SAMPLES[1]);
         let done = AtomicUsize::new(0);
-        let terms: Vec<Term> = (0..PIXELS)
+        let terms: Vec<Option<Term>> = (0..pixels)
             .into_par_iter()
             .map(|i| {
-                let pixel = self.pixel(i, width * height);
+                if self.deadline.is_some_and(|d| Instant::now() >= d) {
+                    return None;
+                }
+                let pixel = self.pixel(i, pixels, width * height);
                 let x = DVec3::from_array(std::array::from_fn(|c| f64::from(colour[c][pixel])));
                 let w = DVec3::from_array(std::array::from_fn(|c| weights[c][pixel]));
                 let place = [
@@ -66,21 +75,21 @@ impl Estimate<'_> {
                 ];
                 let term = self.term(i, place, x, w, samples);
                 let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-                progress.update(Phase::Estimate, n as f32 / PIXELS as f32, 0);
-                term
+                progress.update(Phase::Estimate, n as f32 / pixels as f32, 0);
+                Some(term)
             })
             .collect();
         let mut tally = Tally::default();
         let (mut squared, mut difference, mut reference) =
             (Welford::new(), Welford::new(), Welford::new());
-        for term in &terms {
+        for term in terms.iter().flatten() {
             tally.add(&term.tally);
             squared.push(term.squared);
             difference.push(term.difference);
             reference.push(term.reference);
         }
         let mean = reference.mean();
-        if mean <= 0.0 {
+        if mean.is_nan() || mean <= 0.0 {
             return (None, tally);
         }
         let root = |x: f64| x.max(0.0).sqrt();
@@ -92,7 +101,7 @@ impl Estimate<'_> {
             ci95: [root(squared.mean() - half), root(squared.mean() + half)],
             bias,
             bias_ci95: [bias - bias_half, bias + bias_half],
-            samples: PIXELS as u64,
+            samples: squared.count(),
         };
         (Some(estimate), tally)
     }
@@ -105,10 +114,10 @@ impl Estimate<'_> {
         }
     }
 
-    /// The pixel of draw number `i`: one in each of [`PIXELS`] equal stretches of the image in reading order.
-    fn pixel(&self, i: usize, count: usize) -> usize {
+    /// The pixel of draw number `i` of `n`: one in each of n equal stretches of the image's `count` pixels in reading order.
+    fn pixel(&self, i: usize, n: usize, count: usize) -> usize {
         let u = f64::from(Sampler::new(self.key(u64::MAX), i as u64).next_1d());
-        (((i as f64 + u) / PIXELS as f64 * count as f64) as usize).min(count - 1)
+        (((i as f64 + u) / n as f64 * count as f64) as usize).min(count - 1)
     }
 
     /// Evaluates the pixel in column and row `place`, whose value in the image is `x`, twice.

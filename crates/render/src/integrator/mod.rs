@@ -13,7 +13,7 @@ use crate::image::Image;
 use crate::layers::LayerSet;
 use crate::options::{Crop, Depth, Integrator, Phase, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
-use camera::{Camera, Multiple, Tally};
+use camera::{Camera, Multiple, Tally, least_multiple_depth};
 use estimate::Estimate;
 use fill::{Fill, Filled};
 use glam::Vec3;
@@ -160,6 +160,7 @@ impl<'s> Run<'s> {
             frame: self.frame,
             max_depth: self.max_depth,
             seed: self.options.seed,
+            deadline: self.deadline(1.0),
         };
         let (error, estimate_tally) = estimate.run(&film, self.progress);
         stats.estimated_error = error;
@@ -170,6 +171,12 @@ impl<'s> Run<'s> {
         stats.lookups_missed = tally.missed;
         stats.spp = film.mean_samples();
         stats.wall_s = self.start.elapsed().as_secs_f64();
+        if tally.dropped > 0 {
+            notes.push(format!(
+                "{} camera samples were not finite and count as black: this is a bug, please report it with the scene",
+                tally.dropped
+            ));
+        }
         if timed_out {
             notes.push(format!(
                 "the time limit ended the render after {:.1} samples per pixel; the image is the best so far",
@@ -207,7 +214,12 @@ impl<'s> Run<'s> {
         let scatters = media.list().iter().any(|m| m.sigma_s() != Vec3::ZERO);
         if self.options.integrator == Integrator::Path {
             Way::PathIntegrator
-        } else if !lit || !scatters || self.max_depth.is_some_and(|max| max < 2) {
+        } else if !lit
+            || !scatters
+            || self
+                .max_depth
+                .is_some_and(|max| max < least_multiple_depth(self.scene))
+        {
             Way::NoMultiple
         } else if media.is_isotropic() {
             Way::Records
@@ -310,6 +322,7 @@ impl<'s> Run<'s> {
         multiple: &Multiple<'_>,
     ) -> Tally {
         let camera = Camera::new(self.scene, self.frame, self.max_depth);
+        let mut dropped = 0;
         for x in row.columns() {
             let pixel = u64::from(row.y) * u64::from(self.frame[0]) + u64::from(x);
             for sample in samples.clone() {
@@ -324,10 +337,19 @@ impl<'s> Run<'s> {
                     Integrator::Path => camera.path_traced(x, row.y, &mut sampler),
                     Integrator::Cache => camera.cached(x, row.y, &mut sampler, multiple),
                 };
-                row.add(x, sample, &finite(value));
+                match finite(value) {
+                    Some(value) => row.add(x, sample, &value),
+                    None => {
+                        dropped += 1;
+                        row.add(x, sample, &Pixel::default());
+                    }
+                }
             }
         }
-        camera.tally()
+        Tally {
+            dropped,
+            ..camera.tally()
+        }
     }
 }
 
@@ -356,12 +378,12 @@ fn pass_length(taken: u32) -> u32 {
     taken.clamp(2, 16)
 }
 
-/// The gate of the film: a sample that is not finite is a bug, and must not spoil the pixel.
-fn finite(pixel: Pixel) -> Pixel {
+/// The gate of the film: a sample that is not finite is a bug; it is counted, reported and must not spoil the pixel.
+fn finite(pixel: Pixel) -> Option<Pixel> {
     let ok = pixel.surface.is_finite()
         && pixel.single.is_finite()
         && pixel.multiple.is_finite()
         && pixel.emission.is_finite();
     debug_assert!(ok, "a camera sample is not finite: {pixel:?}");
-    if ok { pixel } else { Pixel::default() }
+    ok.then_some(pixel)
 }

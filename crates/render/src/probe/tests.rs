@@ -94,8 +94,8 @@ fn questions_without_an_answer_are_refused() {
 
 #[test]
 fn outside_of_media_light_is_told_as_if_it_were_scattered_equally() {
-    let fog = "Medium(sigma_t: (1, 1, 1), albedo: (0.9, 0.9, 0.9), region: Sphere(center: (9, 0, 0), radius: 1))";
-    let found = probe(&scene(fog), &options(Integrator::Cache, 64)).unwrap();
+    let fog = "Medium(sigma_t: (1, 1, 1), albedo: (0.9, 0.9, 0.9), region: Sphere(center: (2.6, 0, 0), radius: 2))";
+    let found = probe(&scene(fog), &options(Integrator::Cache, 256)).unwrap();
     assert_eq!(found.sigma_t, [0.0; 3]);
     assert!(found.single.value[0] > 0.0 && found.multiple.value[0] > 0.0);
 }

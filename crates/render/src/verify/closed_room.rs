@@ -11,7 +11,7 @@ use tyndall_math::Ray;
 
 const FAMILY: &str = "E3.7";
 const SAMPLES: usize = 150_000;
-const RECORDS: usize = 128;
+const RAYS: usize = 512;
 
 /// A room.
 struct Closed {
@@ -247,7 +247,7 @@ impl Closed {
             gradient: (n.as_dvec3() * slope).to_array(),
         };
         let name = format!("{name}: record r 0.5 R");
-        rows.extend(point_rows(&world, budget, (FAMILY, &name), RECORDS, &point));
+        rows.extend(point_rows(&world, budget, (FAMILY, &name), RAYS, &point));
         rows
     }
 }

@@ -14,7 +14,7 @@ use tyndall_media::Region;
 const FAMILY: &str = "E2b";
 const X: Vec3 = Vec3::new(0.3, 0.2, 0.1);
 const TOWARDS: Vec3 = Vec3::new(0.2, 0.3, -0.9);
-const REPLICATES: usize = 256;
+const SAMPLES: usize = 1024;
 
 /// Mean cosine, value, gradient: a lamp of 2.5 W/sr at (1.1, −0.4, 1.6), extinction 0.8.
 const POINT: [(f32, f64, [f64; 3]); 4] = [
@@ -236,5 +236,5 @@ fn extended(
         gradient,
     };
     let name = format!("{name}, σt {sigma_t} g {g}");
-    point_rows(&world, budget, (FAMILY, &name), REPLICATES, &point)
+    point_rows(&world, budget, (FAMILY, &name), SAMPLES, &point)
 }

@@ -15,10 +15,10 @@ use tyndall_transport::path::{FirstEvent, Start, trace};
 /// The world of the benchmarks.
 pub(super) type World<'a> = tyndall_transport::World<'a, Solids, Lamps>;
 
-/// Independent replicates of each number.
+/// Independent replicates of each pixel.
 const REPLICATES: usize = 256;
-/// Gather directions of each replicate of a record.
-const RECORD_RAYS: usize = 512;
+/// Independent records at each point.
+const RECORDS: usize = 128;
 /// Relative error of f32 path tracing: positions, optical depths and sums of some ten factors.
 pub(super) const ROUNDING: f64 = 3e-5;
 /// The same for gradients, which are sums of terms of both signs.
@@ -108,21 +108,21 @@ pub(super) struct Point {
 
 /// The rows of one point: value, gradient along the exact gradient, and across it.
 ///
-/// `replicates` records of 512 directions are taken in the full run; single scattering takes as many samples.
+/// Each of the independent records takes `rays` directions in the full run; single scattering takes as many samples.
 pub(super) fn point_rows(
     world: &World<'_>,
     budget: &Budget,
     (family, name): (&'static str, &str),
-    replicates: usize,
+    rays: usize,
     point: &Point,
 ) -> Vec<Row> {
     let exact = glam::DVec3::from(point.gradient);
     let along = exact.normalize_or(glam::DVec3::Y);
     let across = along.any_orthonormal_vector();
     let mut spread = [Welford::new(); 3];
-    // Fewer would leave the tails of the spread too uncertain.
-    for replicate in 0..budget.samples(replicates).max(32) {
-        let (value, gradient) = measure(world, budget.key(replicate), point);
+    let rays = budget.samples(rays);
+    for replicate in 0..RECORDS {
+        let (value, gradient) = measure(world, budget.key(replicate), rays, point);
         let gradient = glam::DVec3::from(gradient);
         let numbers = [value, gradient.dot(along), gradient.dot(across)];
         for (spread, number) in spread.iter_mut().zip(numbers) {
@@ -157,7 +157,7 @@ pub(super) fn point_rows(
 }
 
 /// Value and gradient at `point`, means of the colour channels.
-fn measure(world: &World<'_>, key: Key, point: &Point) -> (f64, [f64; 3]) {
+fn measure(world: &World<'_>, key: Key, rays: usize, point: &Point) -> (f64, [f64; 3]) {
     let (mut value, mut gradient) = (0.0, [0.0; 3]);
     let mut add = |part: Vec3, slopes: [Vec3; 3]| {
         value += Channel::Mean.of(part);
@@ -166,11 +166,11 @@ fn measure(world: &World<'_>, key: Key, point: &Point) -> (f64, [f64; 3]) {
         }
     };
     if point.light != Light::Single {
-        let g = gather::multiple_towards(world, point.x, point.towards, RECORD_RAYS, None, key);
+        let g = gather::multiple_towards(world, point.x, point.towards, rays, None, key);
         add(g.value, g.gradient);
     }
     if point.light != Light::Multiple {
-        let part = probe::single(world, point.x, point.towards, RECORD_RAYS, key);
+        let part = probe::single(world, point.x, point.towards, rays, key);
         add(part.value.into(), part.gradient.map(Vec3::from));
     }
     (value, gradient)

@@ -15,7 +15,7 @@ use tyndall_media::{Media, Region};
 
 const FAMILY: &str = "E3.4";
 const SAMPLES: usize = 150_000;
-const RECORDS: usize = 192;
+const RAYS: usize = 768;
 
 /// Mean cosine, albedo, optical thickness, reflectance and transmittance for diffuse light.
 const WHITE: [(f32, f32, f32, [f64; 2]); 22] = [
@@ -317,5 +317,5 @@ fn inside_rows(
         gradient: [0.0, -slope * per_sphere, 0.0],
     };
     let name = format!("slab 4, albedo {albedo} g {g}: record at depth {depth}");
-    point_rows(&world, budget, (FAMILY, &name), RECORDS, &point)
+    point_rows(&world, budget, (FAMILY, &name), RAYS, &point)
 }

@@ -11,7 +11,7 @@ use tyndall_math::Ray;
 
 const FAMILY: &str = "E3.6";
 const SAMPLES: usize = 150_000;
-const RECORDS: usize = 128;
+const RAYS: usize = 512;
 
 /// Under a sky of radiance 1.
 struct SkySphere {
@@ -352,7 +352,7 @@ impl Sphere {
             gradient: (n.as_dvec3() * (slope * per_sphere)).to_array(),
         };
         let name = format!("{name}: record r {share} R");
-        rows.extend(point_rows(&world, budget, (FAMILY, &name), RECORDS, &point));
+        rows.extend(point_rows(&world, budget, (FAMILY, &name), RAYS, &point));
         rows
     }
 }

@@ -62,6 +62,14 @@ impl Lamps {
         }
     }
 
+    pub(crate) fn with_sky(self, sky: f32) -> Self {
+        Self {
+            sky,
+            sky_index: vec![self.points.len()],
+            ..self
+        }
+    }
+
     pub(crate) fn sky(sky: f32) -> Self {
         Self {
             points: Vec::new(),
