@@ -11,7 +11,7 @@ use tyndall_math::Ray;
 use tyndall_media::Region;
 
 const FAMILY: &str = "E2a";
-const SAMPLES: usize = 200_000;
+const SAMPLES: usize = 150_000;
 
 /// Mean cosines of the Henyey–Greenstein functions in the table.
 const G: [f32; 7] = [0.0, -0.5, 0.3, 0.5, 0.75, 0.9, 0.99];

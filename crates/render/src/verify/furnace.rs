@@ -10,7 +10,7 @@ use tyndall_math::stats::Welford;
 use tyndall_media::{Density, Media, MediumParams, Region};
 
 const FAMILY: &str = "E3.5";
-const SAMPLES: usize = 150_000;
+const SAMPLES: usize = 90_000;
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 pub(super) fn tasks() -> Vec<Task> {

@@ -1,6 +1,6 @@
 //! E3.1: a lamp of power 1 in endless fog: pixels beside it, and fluence with its gradient.
 //!
-//! Isotropic: Davison 1947 and Case and Zweifel 1967; Henyey–Greenstein by P_N expansion to 1e-9. Extinction is 1 per metre.
+//! Isotropic: Davison 1947 and Case and Zweifel 1967; Henyey–Greenstein by spherical harmonics to 1e-9. Extinction is 1 per metre.
 
 use super::measure::{Channel, Light, Point, ROUNDING, World, estimate, pixel, point_rows};
 use super::world::{Lamps, Solids, fog};

@@ -10,8 +10,8 @@ use std::f32::consts::PI;
 use tyndall_math::Ray;
 
 const FAMILY: &str = "E3.6";
-const SAMPLES: usize = 150_000;
-const RAYS: usize = 512;
+const SAMPLES: usize = 90_000;
+const RAYS: usize = 384;
 
 /// Under a sky of radiance 1.
 struct SkySphere {
@@ -35,7 +35,7 @@ struct LampSphere {
     pixels: [f64; 3],
 }
 
-const SKY: [SkySphere; 12] = [
+const SKY: [SkySphere; 10] = [
     SkySphere {
         radius: 0.5,
         albedo: 0.5,
@@ -121,20 +121,6 @@ const SKY: [SkySphere; 12] = [
         fluence: [0.02893223082316854, 0.1728261457126084, 2.782180341274233],
         slope: [0.007141651817502265, 0.13020782576688944, 2.879834060532662],
         pixels: [0.13253116404390936, 0.143859797432386, 0.20208791653066216],
-    },
-    SkySphere {
-        radius: 8.0,
-        albedo: 0.9,
-        fluence: [1.180796012411649, 2.2016972099604972, 6.844435842031381],
-        slope: [0.08602803974209067, 0.6444008492709596, 2.8696644920165935],
-        pixels: [0.4929348945623651, 0.5170953126200428, 0.614571617798069],
-    },
-    SkySphere {
-        radius: 8.0,
-        albedo: 0.99,
-        fluence: [8.868743003832114, 9.559597010730352, 11.32082986475683],
-        slope: [0.07030879146867175, 0.36829080444294515, 0.7750603920634893],
-        pixels: [0.8867628302565643, 0.8953689872747342, 0.9248810026338014],
     },
 ];
 
