@@ -1,6 +1,9 @@
 //! Both integrators make the same image: layer by layer, records against the unbiased path tracer.
 #![allow(clippy::unwrap_used, reason = "tests")]
-#![allow(clippy::print_stdout, reason = "a failure is easier to read beside the other figures")]
+#![allow(
+    clippy::print_stdout,
+    reason = "a failure is easier to read beside the other figures"
+)]
 
 use tyndall_math::stats::Welford;
 use tyndall_render::options::{Integrator, RenderOptions};

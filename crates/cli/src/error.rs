@@ -26,6 +26,14 @@ pub(crate) enum CliError {
         /// All rows.
         rows: usize,
     },
+    /// An output that would replace the scene or another output.
+    #[error(
+        "the output would replace the scene file or another output of this command; choose another name: {}", path.display()
+    )]
+    Overwrites {
+        /// The output.
+        path: std::path::PathBuf,
+    },
     /// `tyndall info` was given a file of a kind it does not know.
     #[error(
         "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images)"
@@ -46,7 +54,10 @@ impl CliError {
     /// 2 where the command or an input file is wrong, 1 for anything else.
     pub(crate) fn status(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::Probe(_) | Self::UnknownKind { .. } => 2,
+            Self::Scene(_)
+            | Self::Probe(_)
+            | Self::UnknownKind { .. }
+            | Self::Overwrites { .. } => 2,
             Self::Render(error) if error.is_input() => 2,
             Self::Render(_) | Self::Verify { .. } | Self::Output(_) | Self::Internal(_) => 1,
         }

@@ -4,7 +4,7 @@
 //! scattering is computed where it is needed.
 
 use crate::lamp_directions::LampDirections;
-use crate::path::{FirstEvent, Start, lamps_in_fog, trace};
+use crate::path::{FirstEvent, Source, Start, Vertex, Visitor, lamps_in_fog, trace};
 use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, World};
 use glam::Vec3;
@@ -16,8 +16,8 @@ use tyndall_media::MediumPoint;
 const BATCHES: usize = 16;
 /// The displacement field ends this far short of the nearest surface, light or boundary.
 const WARP_REACH: f32 = 0.9;
-/// It reaches at least this share of the nearest surface's distance, however close a boundary of a medium is: closer,
-/// the noise of the gradient outweighs the missing boundary term.
+/// It reaches at least this share of the nearest surface's distance or of a free path, however close a boundary of a medium
+/// is: closer, the noise of the gradient outweighs the missing boundary term.
 const WARP_REACH_MIN: f32 = 0.1;
 
 /// In-scattered radiance of light scattered before, at one point.
@@ -169,21 +169,60 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     }
 }
 
+/// One path's estimate of (1/4π) ∫ L dω at `x`, light straight from emitters left out: what a record there would hold, unbiased
+/// and with the noise of a single path. All directions weigh alike.
+pub fn one<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    max_depth: Option<u32>,
+    sampler: &mut Sampler,
+) -> Vec3 {
+    let direction = GatherDirections::new(world, x, None).sample(sampler.next_2d());
+    let start = Start {
+        ray: Ray::new(x, direction.w_i),
+        hit: None,
+        first: FirstEvent::Any,
+        max_depth: max_depth.map(|d| d.saturating_sub(1)),
+    };
+    let mut visitor = ScatteredLight::default();
+    trace(world, &start, sampler, &mut visitor);
+    visitor.value * direction.weight
+}
+
+/// Sums what a path finds, but for light straight from emitters.
+#[derive(Default)]
+struct ScatteredLight {
+    scattered: bool,
+    value: Vec3,
+}
+
+impl Visitor for ScatteredLight {
+    fn vertex(&mut self, _vertex: Vertex<'_, '_>) {
+        self.scattered = true;
+    }
+
+    fn light(&mut self, value: Vec3, last: Option<Vertex<'_, '_>>, _source: Source) {
+        if self.scattered || last.is_some() {
+            self.value += value;
+        }
+    }
+}
+
 /// D of the displacement field at `x`.
 fn warp_radius<G, L: Lights>(world: &World<'_, G, L>, x: Vec3, nearest: f32) -> f32 {
     let light = world.lights.distance_to_point_lights(x);
     let solid = nearest.min(light);
     let boundary = world.media.distance_to_boundary(x);
     let sigma = world.media.at(x).sigma_t.max_element();
-    // Without anything near, a few free paths: farther vertices need no displacement.
-    let free = if sigma > 0.0 {
-        4.0 / sigma
+    let free_path = if sigma > 0.0 {
+        1.0 / sigma
     } else {
         f32::INFINITY
     };
-    let reach = WARP_REACH * solid.min(boundary).min(free);
+    // Without anything near, a few free paths: farther vertices need no displacement.
+    let reach = WARP_REACH * solid.min(boundary).min(4.0 * free_path);
     reach
-        .max(WARP_REACH_MIN * solid.min(free))
+        .max(WARP_REACH_MIN * solid.min(free_path))
         .clamp(f32::MIN_POSITIVE.sqrt(), f32::MAX.sqrt())
 }
 

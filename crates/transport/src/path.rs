@@ -23,8 +23,8 @@ const ROULETTE_GAIN: f32 = 4.0;
 /// Smallest chance of survival: bounds the weight a survivor gains.
 const SURVIVAL_MIN: f32 = 0.1;
 /// A path that keeps its throughput for ever (albedo 1 without a way out) is ended at this rate after [`LONG_PATH`] events.
-const LONG_SURVIVAL: f32 = 0.99;
-const LONG_PATH: u32 = 256;
+const LONG_SURVIVAL: f32 = 0.98;
+const LONG_PATH: u32 = 128;
 
 /// Share of directions that pass close to lamps, after scattering in a medium and at a surface in fog.
 const LAMP_SHARE_MEDIUM: f32 = 0.5;
@@ -359,7 +359,7 @@ fn lit_surface<G: Geometry, L: Lights>(
     if !value.is_finite() || value.max_element() <= 0.0 {
         return;
     }
-    let Some(arrives) = unoccluded(world, &hit.spawn(s.w_i), s.distance) else {
+    let Some(arrives) = unoccluded(world, hit.spawn(s.w_i).origin, hit.position, &s) else {
         return;
     };
     let weight = if s.delta {

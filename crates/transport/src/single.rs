@@ -7,7 +7,7 @@ use crate::free_flight::FreeFlight;
 use crate::light_choice::LightChoice;
 use crate::world::{Geometry, LightSample, Lights, World};
 use glam::Vec3;
-use tyndall_math::{Ray, warp::Equiangular};
+use tyndall_math::{Ray, offset_origin, warp::Equiangular};
 use tyndall_media::MediumPoint;
 
 /// Share of equiangular samples where the light is near enough to have a place.
@@ -140,7 +140,7 @@ impl<'m> SegmentLight<'m> {
         if !value.is_finite() || value.max_element() <= 0.0 {
             return None;
         }
-        let arrives = unoccluded(world, &Ray::new(x, sample.w_i), sample.distance)?;
+        let arrives = unoccluded(world, x, x, &sample)?;
         Some(SegmentSample {
             t,
             value: value * arrives,
@@ -163,16 +163,35 @@ fn finite_end(flight: &FreeFlight<'_>) -> f32 {
         .fold(flight.segment().range().0, f32::max)
 }
 
-/// Shadow rays end this share of the distance before the light, so that the light's own surface does not shade it.
-const SHADOW_END: f32 = 1.0 - 1e-4;
-
-/// Transmittance to a light `distance` away along `ray`; `None` where a surface stands between.
+/// Transmittance from `p` to the light that `light` samples from there; `None` where a surface stands between.
+///
+/// `origin` is where the shadow ray starts: `p` itself in a medium, a little off the surface elsewhere. The ray is aimed anew
+/// at the sampled point, moved off the light's own surface likewise, so that no light shades itself however near or far
+/// from the world's origin it stands.
 pub fn unoccluded<G: Geometry, L>(
     world: &World<'_, G, L>,
-    ray: &Ray,
-    distance: f32,
+    origin: Vec3,
+    p: Vec3,
+    light: &LightSample,
 ) -> Option<Vec3> {
-    if world.geometry.occluded(ray, distance * SHADOW_END) {
+    let (ray, distance) = if light.distance.is_finite() {
+        let point = p + light.w_i * light.distance;
+        let target = if light.normal == Vec3::ZERO {
+            point
+        } else {
+            offset_origin(point, light.normal)
+        };
+        let distance = target.distance(origin);
+        let direction = (target - origin).try_normalize()?;
+        // Rounding of the distance itself.
+        (
+            Ray::new(origin, direction),
+            distance * (1.0 - 4.0 * f32::EPSILON),
+        )
+    } else {
+        (Ray::new(origin, light.w_i), light.distance)
+    };
+    if world.geometry.occluded(&ray, distance) {
         return None;
     }
     if world.media.is_empty() {
@@ -181,7 +200,7 @@ pub fn unoccluded<G: Geometry, L>(
     Some(
         world
             .media
-            .optical_depth(ray, distance)
+            .optical_depth(&ray, distance)
             .map(|tau| (-tau).exp()),
     )
 }

@@ -29,6 +29,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     if let Some(path) = &args.stats {
         check_place(path)?;
     }
+    apart(&args.scene, outputs.iter().chain(&args.stats))?;
 
     let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
     output::warn(&scene.warnings);
@@ -71,6 +72,22 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         for path in &outputs {
             output::say(&format!("wrote {}", path.display()));
         }
+    }
+    Ok(())
+}
+
+/// Refuses outputs that would replace the scene or one another.
+fn apart<'a>(scene: &Path, outputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), CliError> {
+    let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let mut taken = vec![real(scene)];
+    for output in outputs {
+        let place = real(output);
+        if taken.contains(&place) {
+            return Err(CliError::Overwrites {
+                path: output.clone(),
+            });
+        }
+        taken.push(place);
     }
     Ok(())
 }

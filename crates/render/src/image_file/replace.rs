@@ -34,6 +34,11 @@ pub fn check_place(path: &Path) -> Result<(), RenderError> {
             ErrorKind::IsADirectory,
             "a folder of that name stands there",
         ))
+    } else if target.exists() && !target.is_file() {
+        Err(std::io::Error::new(
+            ErrorKind::InvalidInput,
+            "a device, pipe or socket stands there, which a finished file would replace",
+        ))
     } else {
         File::create_new(&beside).and_then(|_| std::fs::remove_file(&beside))
     };

@@ -12,6 +12,7 @@ use tyndall_math::{Ray, Sampler};
 use tyndall_scene::{LightSet, Scene};
 use tyndall_transport::emission;
 use tyndall_transport::free_flight::FreeFlight;
+use tyndall_transport::gather;
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Start, trace};
 use tyndall_transport::single::SegmentLight;
@@ -164,7 +165,7 @@ impl<'s> Camera<'s> {
             match multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    pixel.multiple = self.interpolated(&ray, &flight, cache, sampler);
+                    pixel.multiple = self.interpolated(&world, &ray, &flight, cache, sampler);
                 }
                 Multiple::Paths => {
                     pixel.multiple = self
@@ -223,10 +224,11 @@ impl<'s> Camera<'s> {
         sum / SINGLE_SAMPLES as f32
     }
 
-    fn interpolated(
+    fn interpolated<'w>(
         &self,
+        world: &World<'w, Counted<'_>, LightSet>,
         ray: &Ray,
-        flight: &FreeFlight<'_>,
+        flight: &FreeFlight<'w>,
         cache: &Cache<3>,
         sampler: &mut Sampler,
     ) -> Vec3 {
@@ -241,14 +243,17 @@ impl<'s> Camera<'s> {
             };
             let x = ray.at(t);
             looked += 1;
-            let radiance = cache.lookup(x).or_else(|| {
-                missed += 1;
-                cache.lookup_extended(x)
-            });
-            if let Some(radiance) = radiance {
-                sum += flight.transmittance_to(t) * media.at(x).sigma_s * Vec3::from(radiance)
-                    / flight.pdf_inside(t);
-            }
+            let radiance = cache.lookup(x).map_or_else(
+                || {
+                    // No record is valid here: one path stands in, with noise and without the bias of a record too far.
+                    missed += 1;
+                    let mut path = sampler.branch(u64::from(i));
+                    gather::one(world, x, self.max_depth, &mut path)
+                },
+                Vec3::from,
+            );
+            sum +=
+                flight.transmittance_to(t) * media.at(x).sigma_s * radiance / flight.pdf_inside(t);
         }
         self.lookups.set(self.lookups.get() + looked);
         self.missed.set(self.missed.get() + missed);

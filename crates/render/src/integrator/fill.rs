@@ -106,6 +106,9 @@ impl Fill<'_> {
             .par_iter()
             .enumerate()
             .map(|(i, point)| {
+                if self.out_of_time() {
+                    return (None, 0);
+                }
                 let geometry = Counted::new(self.scene);
                 let record = self.record(&geometry, point, (first + i) as u64, scale);
                 let n = done.fetch_add(1, Ordering::Relaxed) + 1;

@@ -9,7 +9,7 @@ use tyndall_math::{Key, Ray, Sampler};
 use tyndall_media::MediumPoint;
 use tyndall_transport::light_choice::LightChoice;
 use tyndall_transport::single::unoccluded;
-use tyndall_transport::{Geometry, Lights, World};
+use tyndall_transport::{Geometry, LightSample, Lights, World};
 
 /// Single scattering at `x` towards `towards` (any direction where `None`), from `samples` samples.
 ///
@@ -146,8 +146,15 @@ impl<'w, 'm, G: Geometry, L: Lights> Point<'w, 'm, G, L> {
         if !radiance.is_finite() || radiance == Vec3::ZERO {
             return;
         }
-        let ray = Ray::new(self.x, way.w_i);
-        let Some(arrives) = unoccluded(self.world, &ray, way.distance) else {
+        let light = LightSample {
+            w_i: way.w_i,
+            distance: way.distance,
+            radiance,
+            pdf: 1.0,
+            delta: way.delta,
+            normal: way.normal,
+        };
+        let Some(arrives) = unoccluded(self.world, self.x, self.x, &light) else {
             return;
         };
         let phase = self.medium.phase(self.w_o, way.w_i);
