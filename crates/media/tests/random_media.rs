@@ -161,8 +161,11 @@ proptest! {
             // f32 dot products of gradients that may be far larger across the ray than along it; and extinction in f32 itself
             // errs by the rounding of its exponent, many scale heights up by more than one unit in the last place.
             let exponent = |sigma: f32| {
-                let thinned = most(&media, channel) / sigma.max(f32::MIN_POSITIVE);
-                1.0 + thinned.max(1.0).ln()
+                if sigma > 0.0 {
+                    1.0 + (most(&media, channel) / sigma).max(1.0).ln()
+                } else {
+                    1.0
+                }
             };
             // Terms of the size of the extinction cancel where an end stands outside: their rounding is left.
             let left = 1e-7 * most(&media, channel);
