@@ -39,6 +39,7 @@ fn records(n: usize) -> Vec<Record<3>> {
         radius: mean_radius * (0.5 + random.next()),
         value: [0.3 + random.next(), 0.2, 0.1 + random.next()],
         gradient: [random.point() - 0.5, random.point(), Vec3::ZERO],
+        variance: [0.0; 3],
     };
     (0..n).map(record).collect()
 }

@@ -30,6 +30,7 @@ fn sample(position: Vec3, epsilon: f32) -> Record<1> {
         radius: (epsilon * value / sum_of_norms).clamp(0.005, 0.5),
         value: [value],
         gradient: [gradient],
+        variance: [0.0; 1],
     }
 }
 
@@ -68,7 +69,7 @@ fn main() -> Result<(), CacheError> {
         let mut errors = Vec::new();
         // Points that had no part in the filling.
         for p in (200_000..220_000).map(point) {
-            if let Some([found]) = cache.lookup_extended(p) {
+            if let Some([found]) = cache.lookup(p) {
                 errors.push((found / sample(p, epsilon).value[0] - 1.0).abs());
             }
         }

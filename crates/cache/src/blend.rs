@@ -19,105 +19,163 @@ pub(crate) fn weight(s: f32) -> f32 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// What a record adds to a blend; 48 bytes for three channels.
+/// What a record adds to a blend; 64 bytes, a line of the processor's cache, for three channels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape<const N: usize> {
     /// ln L per channel, −∞ where L = 0.
     pub(crate) ln_value: [f32; N],
     /// R ∇ln L per channel, 0 where L = 0.
     pub(crate) slope: [Vec3; N],
+    /// How far noise lowers the mean of ln L per channel: ½v/(1 + 1.5v) with v = Var L/L². 0 where L = 0.
+    ///
+    /// For a true value of 1 and normal noise of variance s², E ln L = −s²/2 − 3s⁴/4 + …, and as v divides by the noisy value
+    /// E v = s² + 3s⁴ + …: of the two second-order terms −1.5 · ½v² is left. Never above ⅓.
+    pub(crate) lowered: [f32; N],
+    pub(crate) radius: f32,
 }
 
 impl<const N: usize> Shape<N> {
     pub(crate) fn new(record: &Record<N>) -> Self {
+        let relative = |channel: usize, x: f64| match f64::from(record.value[channel]) {
+            0.0 => 0.0,
+            value => x / value,
+        };
         Self {
             ln_value: record.value.map(f32::ln),
+            // In f64: the quotient of f32 numbers may overflow.
             slope: std::array::from_fn(|channel| {
-                let value = f64::from(record.value[channel]);
-                if value == 0.0 {
-                    return Vec3::ZERO;
-                }
-                // In f64: the quotient of f32 numbers may overflow.
-                let slope = record.gradient[channel].as_dvec3() * f64::from(record.radius) / value;
+                let gradient = record.gradient[channel].as_dvec3() * f64::from(record.radius);
+                let slope = gradient * relative(channel, 1.0);
                 slope.clamp_length_max(MAX_SLOPE).as_vec3()
             }),
+            lowered: std::array::from_fn(|channel| {
+                let variance = f64::from(record.variance[channel]);
+                let relative = relative(channel, relative(channel, variance));
+                (0.5 * relative / (1.0 + 1.5 * relative)) as f32
+            }),
+            radius: record.radius,
         }
     }
 }
 
 /// The running sums of one lookup.
 ///
-/// L = (Σ⁺w/Σw) · exp(Σ⁺ w (ln Lₖ + δₖ) / Σ⁺w),  δₖ = clamp(∇ln Lₖ·(p − xₖ), ±1.4)
+/// With weights normalised to Σ w = 1, offsets dₖ = p − xₖ and gradients gₖ = ∇ln Lₖ, per channel:
 ///
-/// per channel, where Σ⁺ runs over records with Lₖ > 0: a shadowed record (Lₖ = 0) has no logarithm, and takes its
-/// weight's share of the light instead of all of it. The result is clamped to [½ min Lₖ, 2 max Lₖ].
+/// ln L = Σ w (ln Lₖ + ½ gₖ·dₖ) + ½ (Σ w g)·(Σ w d) + Σ w (1 − w) nₖ
 ///
-/// Jarosz et al. 2008, "Radiance caching for participating media", for the blend; the rules for zeros and the clamps are
-/// ours. Exact for constant and exponential fields.
+/// Each record is extended by the mean of its own gradient and the blended one at `p`, as the trapezoidal rule integrates
+/// the slope between the two points: an error of ½ dᵀHd a record, which always has the sign of the curvature, becomes one of
+/// ½ d̄ᵀHd̄ with d̄ = Σ w d, and vanishes where records stand around `p`. The last term answers the noise of the records:
+/// it lowers the mean of each logarithm by nₖ ≈ ½ Var Lₖ/Lₖ², of which the blend's own noise, Σ w² nₖ, gives back a part in the
+/// exponential.
+///
+/// Records with Lₖ = 0 have no logarithm: the sums leave them out, and the result is scaled by the others' share of the
+/// weight. Both extrapolations are clamped to ±1.4, and the result to [½ min Lₖ, 2 max Lₖ].
+///
+/// Jarosz et al. 2008, "Radiance caching for participating media", for the blend in logarithms; the trapezoidal gradient,
+/// the correction for noise, the rules for zeros and the clamps are ours. Exact for constant and exponential fields.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Blend<const N: usize> {
     /// Σw
     weight: f32,
-    /// Σ⁺w
-    positive: [f32; N],
-    /// Σ⁺ w (ln Lₖ + δₖ)
-    sum: [f32; N],
-    /// min and max of ln Lₖ
-    least: [f32; N],
-    most: [f32; N],
+    /// Sums over records with Lₖ > 0.
+    channels: [Sums; N],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sums {
+    /// Σw
+    weight: f32,
+    /// Σ w (ln Lₖ + ½ gₖ·dₖ + nₖ)
+    ln_value: f32,
+    /// Σ w g
+    gradient: Vec3,
+    /// Σ w d
+    offset: Vec3,
+    /// Σ w² nₖ
+    noise: f32,
+    /// min and max of ln Lₖ, zeros included
+    least: f32,
+    most: f32,
+}
+
+impl Sums {
+    const EMPTY: Self = Self {
+        weight: 0.0,
+        ln_value: 0.0,
+        gradient: Vec3::ZERO,
+        offset: Vec3::ZERO,
+        noise: 0.0,
+        least: f32::INFINITY,
+        most: f32::NEG_INFINITY,
+    };
+
+    /// The channel's value, where all records together weigh `weight`.
+    #[inline]
+    fn value(&self, weight: f32) -> f32 {
+        if self.weight == 0.0 {
+            return 0.0;
+        }
+        let inverse = 1.0 / self.weight;
+        let carried = 0.5 * (self.gradient * inverse).dot(self.offset * inverse);
+        // The product of extreme gradients and radii may overflow; nothing is known then.
+        let carried = if carried.is_finite() {
+            carried.clamp(-MAX_EXTRAPOLATION, MAX_EXTRAPOLATION)
+        } else {
+            0.0
+        };
+        let ln = self.ln_value * inverse + carried - self.noise * inverse * inverse;
+        let share = self.weight / weight;
+        // With a zero among the records `least` is −∞, and so is the lower bound.
+        let mut ln = ln.max(self.least - LN_2);
+        let bound = self.most + LN_2;
+        if ln > bound {
+            // share · exp(ln) ≤ 2 max
+            ln = ln.min(bound - share.ln());
+        }
+        (share * ln.exp()).min(f32::MAX)
+    }
 }
 
 impl<const N: usize> Blend<N> {
     pub(crate) const EMPTY: Self = Self {
         weight: 0.0,
-        positive: [0.0; N],
-        sum: [0.0; N],
-        least: [f32::INFINITY; N],
-        most: [f32::NEG_INFINITY; N],
+        channels: [Sums::EMPTY; N],
     };
 
-    /// Adds a record with weight `w` and its extrapolation R ∇ln L · (p − x)/R before clamping.
+    /// Adds a record with weight `w` and `offset` = (p − x)/R.
     #[inline]
-    pub(crate) fn add(&mut self, w: f32, shape: &Shape<N>, slope_along: impl Fn(Vec3) -> f32) {
+    pub(crate) fn add(&mut self, w: f32, shape: &Shape<N>, offset: Vec3) {
         self.weight += w;
-        for channel in 0..N {
+        let d = offset * shape.radius;
+        let inverse_radius = 1.0 / shape.radius;
+        for (channel, sums) in self.channels.iter_mut().enumerate() {
             let ln_value = shape.ln_value[channel];
-            let delta =
-                slope_along(shape.slope[channel]).clamp(-MAX_EXTRAPOLATION, MAX_EXTRAPOLATION);
+            let slope = shape.slope[channel];
+            let delta = (0.5 * slope.dot(offset)).clamp(-MAX_EXTRAPOLATION, MAX_EXTRAPOLATION);
+            let lowered = shape.lowered[channel];
             // Selections, not branches: which records are zero cannot be foretold.
             let is_positive = ln_value > f32::NEG_INFINITY;
-            self.positive[channel] += if is_positive { w } else { 0.0 };
-            self.sum[channel] += if is_positive {
-                w * (ln_value + delta)
+            let own = if is_positive { w } else { 0.0 };
+            sums.weight += own;
+            sums.ln_value += if is_positive {
+                w * (ln_value + delta + lowered)
             } else {
                 0.0
             };
-            self.least[channel] = min(ln_value, self.least[channel]);
-            self.most[channel] = max(ln_value, self.most[channel]);
+            sums.gradient += (own * inverse_radius) * slope;
+            sums.offset += own * d;
+            sums.noise += own * own * lowered;
+            sums.least = min(ln_value, sums.least);
+            sums.most = max(ln_value, sums.most);
         }
     }
 
     /// The blended value; `None` if no record was added.
     #[inline]
     pub(crate) fn value(&self) -> Option<[f32; N]> {
-        (self.weight > 0.0).then(|| std::array::from_fn(|channel| self.channel(channel)))
-    }
-
-    #[inline]
-    fn channel(&self, channel: usize) -> f32 {
-        let positive = self.positive[channel];
-        if positive == 0.0 {
-            return 0.0;
-        }
-        let share = positive / self.weight;
-        // With a zero among the records `least` is −∞, and so is the lower bound.
-        let mut ln = (self.sum[channel] / positive).max(self.least[channel] - LN_2);
-        let bound = self.most[channel] + LN_2;
-        if ln > bound {
-            // share · exp(ln) ≤ 2 max
-            ln = ln.min(bound - share.ln());
-        }
-        (share * ln.exp()).min(f32::MAX)
+        (self.weight > 0.0).then(|| self.channels.map(|sums| sums.value(self.weight)))
     }
 }
 
@@ -144,13 +202,15 @@ mod tests {
             radius: 1.0,
             value: [value],
             gradient: [gradient],
+            variance: [0.0],
         })
     }
 
     fn blend(parts: &[(f32, f32, f32)]) -> f32 {
         let mut blend = Blend::EMPTY;
         for &(w, value, delta) in parts {
-            blend.add(w, &shape(value, Vec3::ZERO), |_| delta);
+            // All at one place: each is extrapolated by its own and the mean slope alike.
+            blend.add(w, &shape(value, value * delta * Vec3::X), Vec3::X);
         }
         blend.value().unwrap()[0]
     }

@@ -7,8 +7,7 @@ use crate::grid::Ball;
 use crate::lipschitz;
 use crate::octree::{MAX_RECORDS, Octree};
 use crate::record::{Record, is_radius};
-use glam::{DVec3, Vec3};
-use std::ops::Range;
+use glam::Vec3;
 
 /// Records of a field with `N` channels, and an index that finds the valid ones at a point.
 ///
@@ -76,11 +75,12 @@ impl<const N: usize> Cache<N> {
 
     /// The field at `p`, blended from all records whose balls hold `p`; `None` if there are none.
     ///
-    /// Per channel, with weights w = 3s² − 2s³, s = 1 − |p − xₖ|/Rₖ:
+    /// Per channel, with weights w = 3s² − 2s³, s = 1 − |p − xₖ|/Rₖ, normalised to Σ w = 1, and gₖ = ∇ln Lₖ:
     ///
-    /// L = (Σ⁺w/Σw) · exp(Σ⁺ w (ln Lₖ + clamp(∇ln Lₖ·(p − xₖ), ±1.4)) / Σ⁺w)
+    /// ln L = Σ w (ln Lₖ + ½ (gₖ + Σ w g)·(p − xₖ))
     ///
-    /// where Σ⁺ leaves out records with Lₖ = 0; clamped to [½ min Lₖ, 2 max Lₖ]. The result is finite, and smooth in `p`
+    /// Records with Lₖ = 0 take their share of the weight, and noise that the records own up to (their variance) does not
+    /// darken the mean. The result is finite, lies in [½ min Lₖ, 2 max Lₖ], and is smooth in `p`
     /// but where a clamp holds: the last one may jump where a record with a new least or greatest value begins.
     ///
     /// Sums run over records by level (from large radii to small ones by powers of two), by cell, then by insertion.
@@ -89,7 +89,7 @@ impl<const N: usize> Cache<N> {
         let mut blend = Blend::EMPTY;
         self.octree.for_each_holding(p, |slot, offset| {
             let w = weight(1.0 - offset.length());
-            blend.add(w, &self.shapes[slot], |slope| slope.dot(offset));
+            blend.add(w, &self.shapes[slot], offset);
         });
         blend.value()
     }
@@ -105,38 +105,6 @@ impl<const N: usize> Cache<N> {
         self.octree
             .for_each_holding(p, |_, offset| sum += weight(1.0 - offset.length()));
         sum
-    }
-
-    /// As [`Cache::lookup`]; where no record is valid, from the nearest ones, measured by their radii.
-    ///
-    /// All radii are doubled until a ball holds `p`, and the records whose balls then do are blended. `None` only for an
-    /// empty cache or a point that is not finite. About a microsecond up to four radii from a record; further out every
-    /// record is tried.
-    pub fn lookup_extended(&self, p: Vec3) -> Option<[f32; N]> {
-        if let Some(value) = self.lookup(p) {
-            return Some(value);
-        }
-        if self.is_empty() || !p.is_finite() {
-            return None;
-        }
-        for factor in [2.0, 4.0] {
-            let mut blend = Blend::EMPTY;
-            self.octree.for_each_near(
-                p,
-                |side| factor * side,
-                |slots| self.blend_inflated(&mut blend, slots, p, factor),
-            );
-            if let Some(value) = blend.value() {
-                return Some(value);
-            }
-        }
-        let all = 0..self.len();
-        let nearest = (all.clone())
-            .map(|slot| self.offset_from(slot, p).length())
-            .fold(f64::INFINITY, f64::min);
-        let mut blend = Blend::EMPTY;
-        self.blend_inflated(&mut blend, all, p, next_power_of_two(nearest));
-        blend.value()
     }
 
     /// Calls `f` with index and record of all records that stand within `radius` of `p`, whatever their own radii.
@@ -218,32 +186,6 @@ impl<const N: usize> Cache<N> {
             .map(|&index| Shape::new(&self.records[index as usize]))
             .collect();
     }
-
-    /// Adds the records whose balls hold `p` once their radii are multiplied by `factor`.
-    fn blend_inflated(&self, blend: &mut Blend<N>, slots: Range<usize>, p: Vec3, factor: f64) {
-        for slot in slots {
-            let offset = self.offset_from(slot, p);
-            let distance = offset.length() / factor;
-            if distance < 1.0 {
-                let w = weight((1.0 - distance) as f32);
-                blend.add(w, &self.shapes[slot], |slope| {
-                    slope.as_dvec3().dot(offset) as f32
-                });
-            }
-        }
-    }
-
-    /// (p − x)/R in f64, since a point outside all balls may be any number of radii away.
-    fn offset_from(&self, slot: usize, p: Vec3) -> DVec3 {
-        let record = &self.records[self.order[slot] as usize];
-        (p.as_dvec3() - record.position.as_dvec3()) / f64::from(record.radius)
-    }
-}
-
-/// The smallest power of two above `x`, for finite positive `x`.
-fn next_power_of_two(x: f64) -> f64 {
-    let mantissa_bits = f64::MANTISSA_DIGITS - 1;
-    2.0 * f64::from_bits(x.to_bits() >> mantissa_bits << mantissa_bits)
 }
 
 #[cfg(test)]
@@ -272,14 +214,20 @@ mod tests {
     fn record() -> impl Strategy<Value = Record<2>> {
         let radius = (-3.0_f32..3.0).prop_map(|exponent| 10_f32.powf(exponent));
         let radius = prop_oneof![Just(0.5), Just(1.0), radius];
-        (point(), radius, [value(), value()], [point(), point()]).prop_map(
-            |(position, radius, value, gradient)| Record {
+        (
+            point(),
+            radius,
+            [value(), value()],
+            [point(), point()],
+            [value(), value()],
+        )
+            .prop_map(|(position, radius, value, gradient, variance)| Record {
                 position,
                 radius,
                 value,
                 gradient,
-            },
-        )
+                variance,
+            })
     }
 
     fn bits(value: Option<[f32; 2]>) -> Option<[u32; 2]> {
@@ -300,19 +248,10 @@ mod tests {
             let offset = (p - record.position) * (1.0 / record.radius);
             if offset.length_squared() < 1.0 {
                 let w = weight(1.0 - offset.length());
-                blend.add(w, shape, |slope| slope.dot(offset));
+                blend.add(w, shape, offset);
             }
         }
         blend.value()
-    }
-
-    /// What `lookup_extended` is to find where `lookup` finds nothing: radii doubled until a ball holds `p`.
-    fn brute_force_extended(cache: &Cache<2>, p: Vec3) -> Option<[f32; 2]> {
-        (1..200).find_map(|doublings| {
-            let mut blend = Blend::EMPTY;
-            cache.blend_inflated(&mut blend, 0..cache.len(), p, f64::from(doublings).exp2());
-            blend.value()
-        })
     }
 
     proptest! {
@@ -327,9 +266,9 @@ mod tests {
                 prop_assert_eq!(bits(cache.lookup(p)), bits(expected));
                 prop_assert_eq!(cache.covers(p), expected.is_some());
                 prop_assert_eq!(cache.coverage(p) > 0.0, expected.is_some());
-                let extended = expected.or_else(|| brute_force_extended(&cache, p));
-                prop_assert_eq!(bits(cache.lookup_extended(p)), bits(extended));
-                prop_assert!(extended.unwrap().iter().all(|x| x.is_finite() && *x >= 0.0));
+                if let Some(value) = expected {
+                    prop_assert!(value.iter().all(|x| x.is_finite() && *x >= 0.0));
+                }
             }
         }
 
@@ -367,7 +306,7 @@ mod tests {
             let whole = cache_of(&records);
             prop_assert_eq!(cache.records(), &records[..]);
             for p in records.iter().map(|record| record.position).chain([p]) {
-                prop_assert_eq!(bits(cache.lookup_extended(p)), bits(whole.lookup_extended(p)));
+                prop_assert_eq!(bits(cache.lookup(p)), bits(whole.lookup(p)));
             }
         }
     }

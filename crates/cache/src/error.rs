@@ -75,6 +75,11 @@ pub enum Field {
         /// Index of the channel.
         channel: usize,
     },
+    /// The variance of the noise in one channel's value.
+    Variance {
+        /// Index of the channel.
+        channel: usize,
+    },
 }
 
 impl Field {
@@ -83,6 +88,7 @@ impl Field {
         match self {
             Self::Position | Self::Gradient { .. } => "finite".to_owned(),
             Self::Radius => format!("from {MIN_RADIUS:e} to {MAX_RADIUS:e}"),
+            Self::Variance { .. } => "finite and at least 0".to_owned(),
             Self::Value { .. } => {
                 "finite and at least 0; leave out samples that are not before averaging".to_owned()
             }
@@ -97,6 +103,7 @@ impl fmt::Display for Field {
             Self::Radius => write!(f, "the radius"),
             Self::Value { channel } => write!(f, "the value of channel {channel}"),
             Self::Gradient { channel } => write!(f, "the gradient of channel {channel}"),
+            Self::Variance { channel } => write!(f, "the variance of channel {channel}"),
         }
     }
 }

@@ -20,7 +20,8 @@
 //! let sample = |position: Vec3| {
 //!     let (d, r2) = (position - lamp, position.distance_squared(lamp));
 //!     // Trust the record where the field changes by less than half of itself.
-//!     Record { position, radius: 0.25 * r2.sqrt(), value: [1.0 / r2], gradient: [-2.0 * d / (r2 * r2)] }
+//!     Record { position, radius: 0.25 * r2.sqrt(), value: [1.0 / r2], gradient: [-2.0 * d / (r2 * r2)],
+//!         variance: [0.0] }
 //! };
 //!
 //! let mut cache = Cache::new();
@@ -37,8 +38,8 @@
 //! # Filling a cache
 //! Ask [`Cache::covers`] at the points you need, sample where it says no (in parallel, if you like: reading takes
 //! `&self`), [`Cache::insert`] the batch, and repeat. A good radius is ε ΣLⱼ/Σ|∇Lⱼ| over the sources j of the field;
-//! [`Cache::clamp_radii`] then warns records of edges that only their neighbours have seen. Where the cache must answer
-//! without a valid record, [`Cache::lookup_extended`] takes the nearest ones. `examples/scalar_field.rs` does all of it.
+//! [`Cache::clamp_radii`] then warns records of edges that only their neighbours have seen. `examples/scalar_field.rs` does
+//! all of it. Where values are noisy, say how much ([`Record::variance`]): the mean of their logarithms would be too low.
 //!
 //! # Units and signs
 //! Lengths are in your world's unit, the same for positions and radii. Values are 0 or above, in any unit; a gradient is

@@ -21,6 +21,8 @@ pub struct Record<const N: usize> {
     pub value: [f32; N],
     /// How each channel's value changes as the point moves: units of value per unit of length.
     pub gradient: [Vec3; N],
+    /// Variance of the noise in each channel's value, in units of value squared; 0 for exact values.
+    pub variance: [f32; N],
 }
 
 impl<const N: usize> Record<N> {
@@ -42,6 +44,11 @@ impl<const N: usize> Record<N> {
         for (channel, &value) in self.value.iter().enumerate() {
             if !(value >= 0.0 && value.is_finite()) {
                 return refuse(Field::Value { channel }, value);
+            }
+        }
+        for (channel, &variance) in self.variance.iter().enumerate() {
+            if !(variance >= 0.0 && variance.is_finite()) {
+                return refuse(Field::Variance { channel }, variance);
             }
         }
         for (channel, &gradient) in self.gradient.iter().enumerate() {

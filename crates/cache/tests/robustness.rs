@@ -10,6 +10,7 @@ fn record(position: Vec3, radius: f32) -> Record<1> {
         radius,
         value: [2.0],
         gradient: [Vec3::ZERO],
+        variance: [0.0; 1],
     }
 }
 
@@ -169,6 +170,20 @@ fn invalid_records_are_refused_with_index_and_field_and_leave_the_cache_alone() 
                 ..good
             },
             Field::Gradient { channel: 0 },
+        ),
+        (
+            Record {
+                variance: [-1.0],
+                ..good
+            },
+            Field::Variance { channel: 0 },
+        ),
+        (
+            Record {
+                variance: [f32::NAN],
+                ..good
+            },
+            Field::Variance { channel: 0 },
         ),
     ];
     for (bad, expected) in rows {

@@ -92,9 +92,10 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
                 lights: &lamps,
                 media: &media,
             };
-            let (layers, estimate) = pixel(&world, ray, Some(1), 40_000);
+            let (layers, estimate) = pixel(&world, ray, Some(1), 200_000);
             assert_eq!(layers.multiple, Vec3::ZERO);
-            estimate.check(&format!("airlight h {h} {phase:?}"), exact, 3e-2, 1e-4);
+            // The sharp lobe close to the lamp (HG 0.9, h ≤ 1e-3) is the worst row; the others stay under 0.5 %.
+            estimate.check(&format!("airlight h {h} {phase:?}"), exact, 1.1e-2, 1e-4);
         }
     }
 }
@@ -119,12 +120,12 @@ fn all_orders_beside_a_lamp_in_endless_fog_are_exact() {
             &world,
             Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X),
             None,
-            100_000,
+            400_000,
         );
         estimate.check(
             &format!("pixel c {albedo} t0 {t0} h {h}"),
             exact,
-            2e-2,
+            7e-3,
             1e-4,
         );
     }
@@ -149,8 +150,8 @@ fn spheres_under_a_uniform_sky_are_exact() {
             media: &media,
         };
         let ray = Ray::new(Vec3::new(-2.0 * radius, impact * radius, 0.0), Vec3::X);
-        let (_, estimate) = pixel(&world, ray, None, 80_000);
-        estimate.check(&format!("sphere R {radius} c {albedo}"), exact, 1e-2, 1e-5);
+        let (_, estimate) = pixel(&world, ray, None, 200_000);
+        estimate.check(&format!("sphere R {radius} c {albedo}"), exact, 5e-3, 1e-5);
     }
 }
 
@@ -250,7 +251,7 @@ fn a_white_furnace_shows_one_everywhere() {
             media: &media,
         };
         let ray = Ray::new(Vec3::new(-2.0, 0.3, 0.0), Vec3::X);
-        let (_, estimate) = pixel(&world, ray, None, 80_000);
+        let (_, estimate) = pixel(&world, ray, None, 200_000);
         estimate.check(&format!("furnace {sigma} {phase:?}"), 1.0, 3e-3, 1e-5);
     }
 }
@@ -282,7 +283,7 @@ fn an_isothermal_furnace_shows_its_temperature() {
         &world,
         Ray::new(Vec3::new(0.9, 0.9, 0.0), Vec3::NEG_X),
         None,
-        80_000,
+        200_000,
     );
     estimate.check("isothermal", 1.0, 3e-3, 1e-5);
 }
@@ -312,11 +313,11 @@ fn a_closed_room_with_fog_and_a_lamp_is_exact() {
             // From just inside the wall along the full chord.
             let x = -(1.0 - impact * impact).sqrt() * radius * 0.9999;
             let ray = Ray::new(Vec3::new(x, impact * radius * 0.9999, 0.0), Vec3::X);
-            let (_, estimate) = pixel(&world, ray, None, 40_000);
+            let (_, estimate) = pixel(&world, ray, None, 300_000);
             estimate.check(
                 &format!("room R {radius} c {albedo} b {impact}"),
                 exact,
-                3e-2,
+                6e-3,
                 3e-4,
             );
         }
@@ -337,7 +338,7 @@ fn check_record(
         Estimate::default(),
         Estimate::default(),
     );
-    for i in 0..32 {
+    for i in 0..64 {
         let key = Key {
             seed: 5,
             purpose: Purpose::Record,
@@ -389,7 +390,7 @@ fn records_in_endless_fog_have_the_exact_value_and_gradient() {
             x,
             phi,
             slope - uncollided(r),
-            [0.03, 0.08],
+            [0.02, 0.05],
         );
     }
 }
@@ -420,6 +421,6 @@ fn records_in_a_closed_room_have_the_exact_gradient() {
         Vec3::new(0.3, -0.24, 0.32),
         phi - uncollided,
         slope + uncollided * (1.0 + 2.0 / r),
-        [0.03, 0.08],
+        [0.02, 0.05],
     );
 }

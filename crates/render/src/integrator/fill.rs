@@ -31,6 +31,9 @@ const SPACING: f32 = 0.7;
 const RADIUS_SLOPE: f32 = 1.0;
 /// Smallest and largest radius as shares of the length over which the view looks into the fog.
 const RADIUS_RANGE: [f32; 2] = [0.01, 0.25];
+/// Smallest radius in pixels seen from the camera: detail below half a pixel is averaged away. A whole pixel was too much:
+/// where the field bends towards the edge of a medium, all pixels erred to one side (furnace, 24 × 24: +0.2 % in the mean).
+const SMALLEST_FOOTPRINT: f32 = 0.5;
 /// A record may reach past the nearest surface by this factor.
 const PAST_SURFACE: f32 = 1.5;
 
@@ -255,14 +258,17 @@ impl Fill<'_> {
         let radius = (2.0 * self.error.sqrt()).clamp(0.1, 0.5) / inverse;
         let radius = radius
             .min(PAST_SURFACE * g.nearest)
-            .max(point.footprint.max(RADIUS_RANGE[0] * scale))
+            .max((SMALLEST_FOOTPRINT * point.footprint).max(RADIUS_RANGE[0] * scale))
             .min(RADIUS_RANGE[1] * scale);
-        let finite = g.value.is_finite() && g.gradient.iter().all(|d| d.is_finite());
+        let variance = g.value_error * g.value_error;
+        let finite =
+            g.value.is_finite() && variance.is_finite() && g.gradient.iter().all(|d| d.is_finite());
         finite.then_some(Record {
             position: x,
             radius,
             value: g.value.max(Vec3::ZERO).to_array(),
             gradient: g.gradient,
+            variance: variance.to_array(),
         })
     }
 }
