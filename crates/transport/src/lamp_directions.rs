@@ -4,12 +4,15 @@
 //! variance has no bound. Directions with density 1/(2π² sinθ) around the lamps, mixed in, bound it (Georgiev, Křivánek,
 //! Hachisuka, Nowrouzezahrai and Jarosz 2013, "Joint importance sampling of low-order volumetric scattering").
 
-use crate::light_choice::{DEEPEST, LightChoice};
+use crate::light_choice::{LightChoice, damping};
 use crate::world::Lights;
 use glam::Vec3;
 use smallvec::SmallVec;
 use std::f32::consts::PI;
 use tyndall_math::Frame;
+
+/// Lamps that would get a smaller share are left to chance: each lamp costs time in every density.
+const LEAST_CHANCE: f32 = 0.01;
 
 /// Lamps at finite distance as seen from one point, to be mixed with another way of sampling directions.
 #[derive(Clone, Debug, Default)]
@@ -31,10 +34,14 @@ impl LampDirections {
     ) -> Self {
         let lamps: SmallVec<[(Vec3, f32); 8]> = (0..lights.count())
             .filter_map(|l| {
+                let chance = share * choice.pdf(l);
+                if chance < LEAST_CHANCE {
+                    return None;
+                }
                 let offset = lights.pivot(l)? - p;
                 let distance = offset.length();
-                let chance = share * choice.pdf(l) * (-(sigma * distance).min(DEEPEST)).exp();
-                (chance > 0.0 && distance > 0.0).then(|| (offset / distance, chance))
+                let chance = chance * damping(sigma * distance);
+                (distance > 0.0).then(|| (offset / distance, chance))
             })
             .collect();
         let share = lamps.iter().map(|l| l.1).sum();

@@ -1,5 +1,6 @@
 //! One conformance test for every light: what is drawn, what is said of it, and what it adds up to.
 
+use super::importance::mean;
 use super::*;
 use crate::material::Material;
 use crate::mesh::TriangleMesh;

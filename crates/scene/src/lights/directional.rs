@@ -1,6 +1,6 @@
 //! Parallel light from infinitely far away, such as the sun's.
 
-use super::{facing, mean};
+use super::importance::{facing, mean};
 use glam::Vec3;
 use tyndall_math::Ray;
 use tyndall_transport::LightSample;

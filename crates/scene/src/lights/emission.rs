@@ -1,6 +1,6 @@
 //! What an emitting triangle sends out, point by point.
 
-use super::mean;
+use super::importance::mean;
 use crate::triangles::Surfaces;
 use glam::{Vec2, Vec3};
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 //!
 //! Sampling follows the image: texels in proportion to the light they send, and between them as the light varies.
 
-use super::mean;
+use super::importance::mean;
 use super::sky::surface_share;
 use glam::{DVec3, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};

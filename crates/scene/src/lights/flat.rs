@@ -1,7 +1,8 @@
 //! What flat emitters have in common: a side, an area, and an estimate of the light they bring.
 
-use super::{Emission, facing};
-use glam::{DVec3, Vec3};
+use super::Emission;
+use super::importance::{facing, inverse_square_along};
+use glam::Vec3;
 use std::f32::consts::PI;
 use tyndall_math::Ray;
 
@@ -128,20 +129,6 @@ impl FlatEmitter {
     }
 }
 
-/// ∫ dt / (r² + h² + (t − t₀)²) over `range`, where h is the distance of `pivot` from the line and t₀ where it is nearest.
-///
-/// With H² = r² + h² and the range's ends at t₀ + a and t₀ + b it is atan2(H (b − a), H² + a b) / H, which never subtracts two
-/// nearly equal angles.
-fn inverse_square_along(ray: &Ray, pivot: Vec3, radius_squared: f32, range: [f32; 2]) -> f32 {
-    let to_pivot: DVec3 = pivot.as_dvec3() - ray.origin.as_dvec3();
-    let direction = ray.direction.as_dvec3();
-    let nearest = to_pivot.dot(direction);
-    let h2 = (to_pivot - direction * nearest).length_squared() + f64::from(radius_squared);
-    let h = h2.sqrt();
-    let [a, b] = range.map(|t| f64::from(t) - nearest);
-    ((h * (b - a)).atan2(h2 + a * b) / h) as f32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,28 +178,12 @@ mod tests {
         let half = patch(false).importance_along(&through, 2.0);
         let whole = patch(false).importance_along(&through, 4.0);
         let both = patch(true).importance_along(&through, 4.0);
-        assert!(half > 0.0 && (whole / half - 1.0).abs() < 1e-6);
-        assert!((both / half - 2.0).abs() < 1e-6);
+        // Twice what the estimate's arctangent is good for.
+        assert!(half > 0.0 && (whole / half - 1.0).abs() < 1e-4);
+        assert!((both / half - 2.0).abs() < 2e-4);
         let behind = Ray::new(Vec3::new(0.0, 0.0, -1.0), Vec3::NEG_Z);
         assert_eq!(patch(false).importance_along(&behind, 4.0), 0.0);
         let in_the_plane = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X);
         assert_eq!(patch(false).importance_along(&in_the_plane, 4.0), 0.0);
-    }
-
-    #[test]
-    fn the_integral_along_a_ray_agrees_with_a_sum() {
-        let ray = Ray::new(Vec3::new(-3.0, 0.4, 1.0), Vec3::new(0.8, 0.0, 0.6));
-        let (pivot, radius_squared) = (Vec3::new(0.5, 0.0, 2.0), 0.3);
-        let n = 10_000;
-        let sum: f64 = (0..n)
-            .map(|i| {
-                let t = 0.5 + 4.5 * (i as f32 + 0.5) / n as f32;
-                let d2 = ray.at(t).distance_squared(pivot) + radius_squared;
-                4.5 / n as f64 / f64::from(d2)
-            })
-            .sum();
-        let found = inverse_square_along(&ray, pivot, radius_squared, [0.5, 5.0]);
-        // Rounding of f32 squares; the midpoint rule's own error is 1e-8.
-        assert!((f64::from(found) / sum - 1.0).abs() < 1e-5);
     }
 }

@@ -9,6 +9,7 @@ mod emitters;
 mod environment;
 mod environment_file;
 mod flat;
+mod importance;
 mod point;
 mod quad;
 mod sky;
@@ -33,6 +34,7 @@ pub use triangle::TriangleLight;
 use crate::gltf::punctual::PunctualLight;
 use crate::triangles::Surfaces;
 use glam::Vec3;
+use importance::bounded;
 use std::collections::HashMap;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -259,32 +261,4 @@ impl Lights for LightSet {
             .fold(f32::INFINITY, f32::min)
             .sqrt()
     }
-}
-
-/// Keeps estimates such that thousands of them can be summed in f32: a point may lie on a lamp.
-fn bounded(importance: f32) -> f32 {
-    const LARGEST: f32 = 1e30;
-    importance.min(LARGEST)
-}
-
-/// Mean of the three channels: the one number by which lights are compared.
-fn mean(color: Vec3) -> f32 {
-    color.element_sum() / 3.0
-}
-
-/// How much of what a light within `radius` of `center` sends to `p` meets the front of a surface with the geometric
-/// `normal` there: a bound on the cosine, 0 only where the whole light stands behind the surface; 1 in a medium.
-///
-/// The floor keeps lights alive that graze: a shading normal may lean towards them.
-fn facing(p: Vec3, normal: Option<Vec3>, center: Vec3, radius: f32) -> f32 {
-    const LEAST: f32 = 0.1;
-    let Some(normal) = normal else {
-        return 1.0;
-    };
-    let to_light = center - p;
-    let above = normal.dot(to_light) + radius;
-    if above <= 0.0 {
-        return 0.0;
-    }
-    (above / to_light.length().max(f32::MIN_POSITIVE)).clamp(LEAST, 1.0)
 }

@@ -1,6 +1,6 @@
 //! Light of one colour from all directions.
 
-use super::mean;
+use super::importance::mean;
 use glam::Vec3;
 use std::f32::consts::PI;
 use tyndall_math::{Ray, warp};

@@ -1,7 +1,7 @@
 //! A lamp without extent that shines into a cone, as in `KHR_lights_punctual`.
 
+use super::importance::{facing, mean};
 use super::point::towards_lamp;
-use super::{facing, mean};
 use glam::{DVec3, Vec3};
 use std::f32::consts::{PI, TAU};
 use tyndall_math::{Ray, warp::Equiangular};
