@@ -2,16 +2,9 @@
 //!
 //! Values: Sun et al. 2005 (airlight), Davison 1947 and Case and Zweifel 1967 (infinite medium), and integral equations
 //! for the sphere, computed to eight digits and more outside this project.
-#![allow(clippy::unwrap_used, reason = "tests")]
-#![allow(
-    clippy::print_stdout,
-    reason = "a failing table is easier to read whole"
-)]
 
-mod rig;
-
+use crate::rig::{Estimate, Lamps, OPEN, Room, fog, pixel, sphere};
 use glam::Vec3;
-use rig::{Estimate, Lamps, OPEN, Room, fog, pixel, sphere};
 use std::f32::consts::PI;
 use tyndall_math::{Key, Purpose, Ray};
 use tyndall_media::{

@@ -1,0 +1,10 @@
+//! Light transport against exact solutions, and its samplers against their densities.
+#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(
+    clippy::print_stdout,
+    reason = "a failing table is easier to read whole"
+)]
+
+mod exact;
+mod rig;
+mod samplers;
