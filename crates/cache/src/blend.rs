@@ -5,8 +5,9 @@ use crate::record::Record;
 use glam::Vec3;
 use std::f32::consts::LN_2;
 
-/// A record changes the logarithm of its value by at most this much (a factor of 4) when it is extrapolated.
-const MAX_EXTRAPOLATION: f32 = 1.4;
+/// Each half of a record's extrapolation, by its own gradient and by the blended one, changes the logarithm by at most this much:
+/// a factor of 4 in all, as far as a log-linear field is believed.
+const MAX_EXTRAPOLATION: f32 = 0.7;
 
 /// Bound on |∇ln L|·R; far above [`MAX_EXTRAPOLATION`] and far below overflow.
 const MAX_SLOPE: f64 = 1e6;
@@ -65,13 +66,13 @@ impl<const N: usize> Shape<N> {
 /// ln L = Σ w (ln Lₖ + ½ gₖ·dₖ) + ½ (Σ w g)·(Σ w d) + Σ w (1 − w) nₖ
 ///
 /// Each record is extended by the mean of its own gradient and the blended one at `p`, as the trapezoidal rule integrates
-/// the slope between the two points: an error of ½ dᵀHd a record, which always has the sign of the curvature, becomes one of
-/// ½ d̄ᵀHd̄ with d̄ = Σ w d, and vanishes where records stand around `p`. The last term answers the noise of the records:
+/// the slope between the two points: an error of −½ dᵀHd a record, which never has the sign of the curvature, becomes one of
+/// −½ d̄ᵀHd̄ with d̄ = Σ w d, and vanishes where records stand around `p`. The last term answers the noise of the records:
 /// it lowers the mean of each logarithm by nₖ ≈ ½ Var Lₖ/Lₖ², of which the blend's own noise, Σ w² nₖ, gives back a part in the
-/// exponential.
+/// exponential. Left over are terms of second order in the variance: skewed noise, and the noise of gradients.
 ///
 /// Records with Lₖ = 0 have no logarithm: the sums leave them out, and the result is scaled by the others' share of the
-/// weight. Both extrapolations are clamped to ±1.4, and the result to [½ min Lₖ, 2 max Lₖ].
+/// weight. Both halves of the extrapolation are clamped to ±0.7, and the result to [½ min Lₖ, 2 max Lₖ].
 ///
 /// Jarosz et al. 2008, "Radiance caching for participating media", for the blend in logarithms; the trapezoidal gradient,
 /// the correction for noise, the rules for zeros and the clamps are ours. Exact for constant and exponential fields.

@@ -77,7 +77,7 @@ impl<const N: usize> Cache<N> {
     ///
     /// Per channel, with weights w = 3s² − 2s³, s = 1 − |p − xₖ|/Rₖ, normalised to Σ w = 1, and gₖ = ∇ln Lₖ:
     ///
-    /// ln L = Σ w (ln Lₖ + ½ (gₖ + Σ w g)·(p − xₖ))
+    /// ln L = Σ w (ln Lₖ + ½ (gₖ + Σ w g)·(p − xₖ)) + a correction for the records' noise
     ///
     /// Records with Lₖ = 0 take their share of the weight, and noise that the records own up to (their variance) does not
     /// darken the mean. The result is finite, lies in [½ min Lₖ, 2 max Lₖ], and is smooth in `p`

@@ -141,7 +141,7 @@ pub(crate) struct CompareArgs {
     /// An independent second half of a noisy reference.
     pub(crate) b2: Option<PathBuf>,
     /// Stops by which both images are brightened before FLIP.
-    #[arg(long, value_name = "E", default_value_t = 0.0, value_parser = value::finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value_t = 0.0, value_parser = value::stops, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
     /// The layer to compare.
     #[arg(long, value_name = "NAME", default_value = "beauty")]

@@ -67,6 +67,14 @@ pub(crate) fn finite(text: &str) -> Result<f32, String> {
     }
 }
 
+/// A number of stops, in the range that the scene file allows.
+pub(crate) fn stops(text: &str) -> Result<f32, String> {
+    match *numbers(text)?.as_slice() {
+        [number] if number.abs() <= 100.0 => Ok(number),
+        _ => Err("one number of stops from -100 to 100 is wanted".to_owned()),
+    }
+}
+
 /// What an error allows, without the option and the value that clap already names.
 fn allowed(error: RenderError) -> String {
     match error {

@@ -11,7 +11,6 @@ use smallvec::SmallVec;
 /// A ray from 0 to a largest distance, cut into its stretches inside each medium.
 #[derive(Clone, Debug)]
 pub struct Segment<'a> {
-    t_max: f32,
     pieces: SmallVec<[Piece<'a>; 4]>,
 }
 
@@ -88,17 +87,12 @@ impl<'a> Segment<'a> {
             .iter()
             .filter_map(|medium| Piece::new(medium, line, t_max.into()))
             .collect();
-        Self { t_max, pieces }
+        Self { pieces }
     }
 
     /// Whether no medium is met.
     pub fn is_empty(&self) -> bool {
         self.pieces.is_empty()
-    }
-
-    /// The largest distance, as given.
-    pub fn t_max(&self) -> f32 {
-        self.t_max
     }
 
     /// First and last distance with medium; (0, 0) where there is none. The last may be infinite.

@@ -135,7 +135,9 @@ impl Pairs {
         } else {
             self.r.clone()
         };
-        let weights = weights(&smooth);
+        // Values that do not count are 0 here: they neither add to the sum nor to the number.
+        let sum: f64 = self.r.iter().flatten().map(|&r| f64::from(r)).sum();
+        let weights = weights(&smooth, sum / self.counted.max(1.0));
         let (mut squares, mut relative, mut difference, mut reference) = (0.0, 0.0, 0.0, 0.0);
         for (c, a) in self.a.iter().enumerate() {
             let halves = self.halves[0][c].iter().zip(&self.halves[1][c]);

@@ -4,6 +4,7 @@
 
 use crate::layers::known_layers;
 use std::path::PathBuf;
+use tyndall_scene::FilmSizeError;
 
 /// Errors of this crate; the text says what, where, what is allowed and what would mend it.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +19,21 @@ pub enum RenderError {
         found: String,
         /// What may be given.
         allowed: String,
+    },
+    /// A frame larger than any image can be.
+    #[error("{source}; choose another --width or --height")]
+    Frame {
+        /// What the sizes may be.
+        #[from]
+        source: FilmSizeError,
+    },
+    /// Not enough memory for the film.
+    #[error("the film of {} × {} pixels needs {mib} MiB of memory, which the system does not give; render parts of the frame with --crop", size[0], size[1])]
+    Memory {
+        /// Width and height of the crop in pixels.
+        size: [u32; 2],
+        /// What the film needs.
+        mib: usize,
     },
     /// A part of the contract that this version does not hold yet.
     #[error("{what} is not built yet in this version; {instead}")]
@@ -112,7 +128,10 @@ impl RenderError {
     pub fn is_input(&self) -> bool {
         !matches!(
             self,
-            Self::Threads { .. } | Self::Write { .. } | Self::NotFinite { .. }
+            Self::Threads { .. }
+                | Self::Memory { .. }
+                | Self::Write { .. }
+                | Self::NotFinite { .. }
         )
     }
 }

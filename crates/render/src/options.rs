@@ -48,16 +48,6 @@ pub enum Depth {
     Limit(u32),
 }
 
-impl Depth {
-    /// The limit as a number, `u32::MAX` where there is none.
-    pub fn limit(self) -> u32 {
-        match self {
-            Self::Unlimited => u32::MAX,
-            Self::Limit(n) => n,
-        }
-    }
-}
-
 impl FromStr for Depth {
     type Err = RenderError;
 
@@ -163,7 +153,8 @@ pub struct RenderOptions {
     pub seed: u64,
     /// Number of threads; all processors where none is given. The image does not depend on it.
     pub threads: Option<usize>,
-    /// When to stop early with the best image so far, counted from the call.
+    /// When to stop early with the best image so far, counted from the call. Two samples of every pixel are taken however long they
+    /// last: without them there is no image.
     pub time_limit: Option<Duration>,
     /// The layers to make.
     pub layers: Option<LayerSet>,

@@ -4,19 +4,24 @@
 
 use rayon::prelude::*;
 
-/// Weights w = 1/(r² + 0.01 mean(r)²) for every value of the reference `r`, whose channels all have one length.
+/// Weights w = 1/(r² + 0.01 mean(r)²) for every value of the `smooth` reference, whose channels all have one length.
 ///
-/// mean(r) runs over all pixels and channels. f64, since r² leaves the range of f32 for radiances beyond 10^±19. A black reference
-/// has infinite weights: see [`weighted`].
-pub fn weights(reference: &[Vec<f32>]) -> Vec<Vec<f64>> {
-    let n = reference.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-    let sum: f64 = reference.iter().flatten().map(|&r| f64::from(r)).sum();
-    let floor = 0.01 * (sum / n).powi(2);
+/// `mean` is that of the reference before it was smoothed, over all pixels and channels: lone lit pixels on black leave no trace
+/// in their medians. f64, since r² leaves the range of f32 for radiances beyond 10^±19. A black reference has infinite
+/// weights: see [`weighted`].
+pub fn weights(smooth: &[Vec<f32>], mean: f64) -> Vec<Vec<f64>> {
+    let floor = 0.01 * mean.powi(2);
     let weight = |r: &f32| 1.0 / (f64::from(*r).powi(2) + floor);
-    reference
+    smooth
         .iter()
         .map(|channel| channel.iter().map(weight).collect())
         .collect()
+}
+
+/// Mean over all pixels and channels.
+pub fn mean(image: &[Vec<f32>]) -> f64 {
+    let n = image.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+    image.iter().flatten().map(|&r| f64::from(r)).sum::<f64>() / n
 }
 
 /// A squared difference times its weight; no difference is no error, whatever the weight.
@@ -85,7 +90,8 @@ mod tests {
 
     #[test]
     fn weights_follow_their_formula() {
-        let w = weights(&[vec![1.0, 3.0], vec![0.0, 4.0]]);
+        let image = [vec![1.0, 3.0], vec![0.0, 4.0]];
+        let w = weights(&image, mean(&image));
         let floor = 0.01 * 4.0;
         for (w, r) in w.iter().flatten().zip([1.0f64, 3.0, 0.0, 4.0]) {
             assert!((w * (r * r + floor) - 1.0).abs() < 1e-15);

@@ -28,6 +28,17 @@ pub fn z_test(mean: f64, error: f64, expected: f64) -> f64 {
     }
 }
 
+/// Probability that a variable of Student's t-distribution with `degrees_of_freedom` is at least as far from 0 as `t`.
+///
+/// By the normal variable of the same chance, to a relative error of some per cent in chances down to 10⁻⁹ from 10 degrees of
+/// freedom on: z = (8n + 1)/(8n + 3) √(n ln(1 + t²/n)). Wallace 1959, "Bounds on normal approximations to Student's and the
+/// chi-square distributions", equation 1.7.
+pub fn student_t_p_value(t: f64, degrees_of_freedom: f64) -> f64 {
+    let n = degrees_of_freedom;
+    let z = (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n).ln_1p()).sqrt();
+    normal_p_value(z)
+}
+
 /// Probability that a χ² variable of `degrees_of_freedom` reaches `statistic`.
 pub fn chi_square_p_value(statistic: f64, degrees_of_freedom: f64) -> f64 {
     upper_gamma(0.5 * degrees_of_freedom, 0.5 * statistic)
@@ -109,6 +120,20 @@ mod tests {
         }
         assert_eq!(chi_square_p_value(0.0, 7.0), 1.0);
         assert_eq!(normal_p_value(f64::INFINITY), 0.0);
+    }
+
+    #[test]
+    fn student_s_distribution_meets_its_tables() {
+        // Two-sided points of the usual tables: 10 and 23 degrees of freedom.
+        for (t, n, p) in [
+            (2.228, 10.0, 0.05),
+            (4.587, 10.0, 0.001),
+            (2.069, 23.0, 0.05),
+            (3.768, 23.0, 0.001),
+        ] {
+            let found = student_t_p_value(t, n);
+            assert!((found / p - 1.0).abs() < 0.04, "{t} {n}: {found}");
+        }
     }
 
     #[test]

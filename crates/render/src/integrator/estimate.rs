@@ -6,7 +6,7 @@
 use super::camera::{Camera, Tally};
 use crate::film::Film;
 use crate::options::{Phase, Progress};
-use crate::relative::{median_5x5, weights};
+use crate::relative::{mean, median_5x5, weighted, weights};
 use crate::stats::ErrorEstimate;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -55,7 +55,8 @@ impl Estimate<'_> {
         let crop = film.crop();
         let (width, height) = (crop.width as usize, crop.height as usize);
         let colour = film.colour();
-        let weights = weights(&colour.each_ref().map(|c| median_5x5(c, width, height)));
+        let smooth = colour.each_ref().map(|c| median_5x5(c, width, height));
+        let weights = weights(&smooth, mean(&colour));
         let budget = film.mean_samples() * (width * height) as f64 * SHARE;
         let pixels = MOST_PIXELS.min(width * height);
         let samples = ((budget / (2.0 * pixels as f64)) as u64).clamp(SAMPLES[0], SAMPLES[1]);
@@ -89,7 +90,8 @@ impl Estimate<'_> {
             reference.push(term.reference);
         }
         let mean = reference.mean();
-        if mean.is_nan() || mean <= 0.0 {
+        // Black throughout, or lit nowhere but in the evaluations: nothing to relate an error to.
+        if mean.is_nan() || mean <= 0.0 || !squared.mean().is_finite() {
             return (None, tally);
         }
         let root = |x: f64| x.max(0.0).sqrt();
@@ -136,7 +138,10 @@ impl Estimate<'_> {
         let (r1, r2) = (evaluate(0), evaluate(1));
         let reference = (r1 + r2) * 0.5;
         Term {
-            squared: ((x - r1) * (x - r2) * w).element_sum() / 3.0,
+            squared: (0..3)
+                .map(|c| weighted((x[c] - r1[c]) * (x[c] - r2[c]), w[c]))
+                .sum::<f64>()
+                / 3.0,
             difference: (x - reference).element_sum() / 3.0,
             reference: reference.element_sum() / 3.0,
             tally: camera.tally(),

@@ -19,7 +19,7 @@ use tyndall_transport::world::{Geometry, Lights};
 /// Camera rays along the longer side of the frame on the first level; each level doubles them, at most to one per pixel.
 const FIRST_RAYS: u32 = 16;
 /// Levels end when no more than this share of a new level's points is found without a record: the camera pass then
-/// stretches the nearest ones.
+/// traces paths there.
 const GAPS_LEFT: f32 = 0.04;
 /// Points on each camera ray, evenly spread in transmittance.
 const POINTS_PER_RAY: u32 = 8;
@@ -55,6 +55,8 @@ pub(super) struct Filled {
     /// The pixel through which each record was asked for: column and row.
     pub(super) pixels: Vec<[u32; 2]>,
     pub(super) rays: u64,
+    /// Whether the deadline ended the fill.
+    pub(super) cut_short: bool,
 }
 
 /// A point on a camera ray that asks for a record.
@@ -74,6 +76,7 @@ impl Fill<'_> {
             cache: Cache::new(),
             pixels: Vec::new(),
             rays: 0,
+            cut_short: false,
         };
         let scale = self.view_scale();
         let strides = strides(self.frame);
@@ -82,7 +85,11 @@ impl Fill<'_> {
                 let fraction = (level as f32 + round as f32 / ROUNDS as f32) / strides.len() as f32;
                 progress.update(Phase::Fill, fraction, filled.cache.len());
                 let (missing, share) = self.uncovered(&filled.cache, level as u64, stride);
-                if missing.is_empty() || self.out_of_time() || (round == 0 && share < GAPS_LEFT) {
+                if self.out_of_time() {
+                    filled.cut_short = true;
+                    return filled;
+                }
+                if missing.is_empty() || (round == 0 && share < GAPS_LEFT) {
                     break;
                 }
                 let points = thin(&missing, &filled.cache, scale);
@@ -125,12 +132,14 @@ impl Fill<'_> {
             .zip(points)
             .filter_map(|((record, _), point)| Some((record?, point.pixel)))
             .unzip();
-        filled.pixels.extend(seen);
         let cache = &mut filled.cache;
         let kept = cache
             .insert(records)
             .and_then(|()| cache.clamp_radii(RADIUS_SLOPE));
         debug_assert!(kept.is_ok(), "{kept:?}");
+        if kept.is_ok() {
+            filled.pixels.extend(seen);
+        }
         kept.is_ok()
     }
 

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 use tyndall_math::{Key, Purpose, Sampler};
-use tyndall_scene::Scene;
+use tyndall_scene::{FilmSize, Scene};
 use tyndall_transport::world::Lights;
 
 /// Samples per pixel before the noise is believed.
@@ -62,6 +62,7 @@ pub fn render(
 ) -> Result<Outcome, RenderError> {
     options.check()?;
     let frame = options.frame([scene.film.width, scene.film.height]);
+    FilmSize::new(frame[0], frame[1])?;
     let crop = options.crop.unwrap_or(Crop::whole(frame)).within(frame)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = options.threads {
@@ -72,7 +73,7 @@ pub fn render(
         reason: e.to_string(),
     })?;
     let run = Run::new(scene, options, progress, frame, crop);
-    let mut outcome = pool.install(|| run.render());
+    let mut outcome = pool.install(|| run.render())?;
     outcome.stats.threads = pool.current_num_threads();
     outcome.stats.peak_rss_mib = peak_rss_mib();
     Ok(outcome)
@@ -126,7 +127,7 @@ impl<'s> Run<'s> {
             .is_some_and(|d| Instant::now() >= d)
     }
 
-    fn render(&self) -> Outcome {
+    fn render(&self) -> Result<Outcome, RenderError> {
         let mut notes = Vec::new();
         let mut stats = Stats::default();
         let layers = self
@@ -134,10 +135,11 @@ impl<'s> Run<'s> {
             .layers
             .clone()
             .unwrap_or_else(|| LayerSet::usual(self.scene.media.emits()));
-        let mut film = Film::new(self.frame, self.crop, layers);
+        let mut film = Film::new(self.frame, self.crop, layers)?;
 
         let way = self.way(&mut notes);
         let filled = (way == Way::Records).then(|| self.fill());
+        let cut_short = filled.as_ref().is_some_and(|filled| filled.cut_short);
         if let Some(filled) = &filled {
             stats.rays += filled.rays;
             let count = filled.cache.len() as u64;
@@ -177,6 +179,12 @@ impl<'s> Run<'s> {
                 tally.dropped
             ));
         }
+        if cut_short {
+            notes.push(
+                "the time limit ended the filling of the cache: where records are missing paths are traced, with more noise"
+                    .to_owned(),
+            );
+        }
         if timed_out {
             notes.push(format!(
                 "the time limit ended the render after {:.1} samples per pixel; the image is the best so far",
@@ -188,7 +196,7 @@ impl<'s> Run<'s> {
             Way::NoMultiple => "records: none; single: direct; SH: off".to_owned(),
             Way::Records => format!(
                 "records: {} multiple; single: direct; SH: off",
-                stats.records["multiple"]
+                grouped(stats.records["multiple"])
             ),
             Way::Paths => {
                 "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
@@ -198,13 +206,13 @@ impl<'s> Run<'s> {
         if let (Some(filled), Some(points)) = (&filled, image.channels.get_mut("records")) {
             mark_records(&filled.pixels, self.crop, points);
         }
-        Outcome {
+        Ok(Outcome {
             image,
             stats,
             notes,
-            timed_out,
+            timed_out: timed_out || cut_short,
             summary: format!("{}; {found}", self.scene.summary()),
-        }
+        })
     }
 
     /// The cheapest way that does what this scene needs.
@@ -360,6 +368,15 @@ enum Way {
     NoMultiple,
     Records,
     Paths,
+}
+
+/// A number with its thousands set apart.
+fn grouped(n: u64) -> String {
+    if n < 1000 {
+        n.to_string()
+    } else {
+        format!("{} {:03}", grouped(n / 1000), n % 1000)
+    }
 }
 
 /// Counts the records asked for through each pixel of `crop`.

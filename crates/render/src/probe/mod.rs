@@ -35,9 +35,11 @@ pub struct ProbeOptions {
 /// Why a probe cannot be answered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeError {
-    /// Nothing to average over.
-    #[error("--samples is 0, but it must be at least 1")]
-    NoSamples,
+    /// Too few to average over.
+    #[error(
+        "--samples is {0}, but it must be at least 2: standard errors come from the spread of samples"
+    )]
+    FewSamples(u32),
     /// The point is not a place.
     #[error("--at is ({}, {}, {}), but all of its numbers must be finite", .0.x, .0.y, .0.z)]
     Point(Vec3),
@@ -80,10 +82,10 @@ pub struct Probe {
 /// Measures scattered light in `scene`. Outside of media the light that an isotropic medium would scatter there is told.
 ///
 /// # Errors
-/// A point or direction that is none, no samples, or a missing direction where scattering depends on it.
+/// A point or direction that is none, fewer than two samples, or a missing direction where scattering depends on it.
 pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError> {
-    if options.samples == 0 {
-        return Err(ProbeError::NoSamples);
+    if options.samples < 2 {
+        return Err(ProbeError::FewSamples(options.samples));
     }
     if !options.at.is_finite() {
         return Err(ProbeError::Point(options.at));

@@ -6,8 +6,7 @@ use super::single::Point;
 use super::{Part, Sample, average};
 use glam::Vec3;
 use tyndall_math::{Key, Ray, Sampler};
-use tyndall_transport::gather::GatherDirections;
-use tyndall_transport::path::{FirstEvent, Source, Start, Vertex, Visitor, trace};
+use tyndall_transport::gather::{self, GatherDirections};
 use tyndall_transport::{Geometry, Lights, World};
 
 /// The step of the differences as a share of the length over which light changes: its square is their relative error.
@@ -102,37 +101,13 @@ impl<'w, 'm, G: Geometry, L: Lights> Place<'w, 'm, G, L> {
     /// Single and multiple scattering by one path.
     fn sample(&self, key: Key, i: u64) -> [Vec3; 2] {
         let mut sampler = Sampler::new(key, i);
-        let direction = self.directions.sample(sampler.next_2d());
-        let start = Start {
-            ray: Ray::new(self.x, direction.w_i),
-            hit: None,
-            first: FirstEvent::Any,
-            max_depth: self.max_depth.map(|d| d.saturating_sub(1)),
-        };
-        let mut visitor = Scattered::default();
-        trace(self.world, &start, &mut sampler, &mut visitor);
-        [
-            self.point.sample(key, i, false).value,
-            visitor.sum * direction.weight,
-        ]
-    }
-}
-
-/// Sums the light of a path but for what comes straight from emitters, which single scattering has.
-#[derive(Default)]
-struct Scattered {
-    started: bool,
-    sum: Vec3,
-}
-
-impl Visitor for Scattered {
-    fn vertex(&mut self, _vertex: Vertex<'_, '_>) {
-        self.started = true;
-    }
-
-    fn light(&mut self, value: Vec3, last: Option<Vertex<'_, '_>>, _source: Source) {
-        if self.started || last.is_some() {
-            self.sum += value;
-        }
+        let multiple = gather::one_of(
+            &self.directions,
+            self.world,
+            self.x,
+            self.max_depth,
+            &mut sampler,
+        );
+        [self.point.sample(key, i, false).value, multiple]
     }
 }

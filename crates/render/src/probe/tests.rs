@@ -89,7 +89,7 @@ fn questions_without_an_answer_are_refused() {
     };
     assert_eq!(ask(&forward, nowhere), ProbeError::Direction(Vec3::ZERO));
     let none = ProbeOptions { samples: 0, ..good };
-    assert_eq!(ask(&forward, none), ProbeError::NoSamples);
+    assert_eq!(ask(&forward, none), ProbeError::FewSamples(0));
 }
 
 #[test]

@@ -182,7 +182,7 @@ fn both_sides(media: &Media, budget: &Budget, ray: impl Fn([f32; 2]) -> Ray) -> 
         };
         // Different numbers on the two sides: their sum is then as uncertain as it looks.
         let budget = Budget {
-            task: 2 * budget.task + u64::from(side.y < 0.0),
+            task: budget.task | u64::from(side.y < 0.0) << 31,
             ..*budget
         };
         pixel(&world, &budget, SAMPLES, None, Channel::Mean, &ray)

@@ -4,6 +4,7 @@ use super::error::{GltfError, get};
 use super::images::Images;
 use crate::error::Warning;
 use crate::material::Material;
+use crate::scene_file::numbers::MAX_POWER;
 use crate::texture::{Filter, TextureRef, Wrap};
 use ::gltf::json;
 use ::gltf::json::material::AlphaMode;
@@ -119,7 +120,14 @@ impl<'a> Materials<'a> {
             format!("{at}/extensions/KHR_materials_emissive_strength/emissiveStrength");
         let [strength] = not_negative([strength], &strength_at)?;
         let emissive = not_negative(material.emissive_factor.0, &format!("{at}/emissiveFactor"))?;
-        let emissive = not_negative((Vec3::from(emissive) * strength).to_array(), &strength_at)?;
+        let emissive = emissive.map(|e| e * strength);
+        if Vec3::from(emissive).max_element() > MAX_POWER {
+            return Err(GltfError::value(
+                strength_at,
+                format!("{strength}"),
+                "emissiveFactor times emissiveStrength must be at most 1e30",
+            ));
+        }
         let mut clamped = false;
         let mut unit = |value: f32, at: String| -> Result<f32, GltfError> {
             let [value] = not_negative([value], &at)?;

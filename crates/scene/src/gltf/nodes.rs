@@ -4,6 +4,7 @@
 
 use super::error::{GltfError, get};
 use crate::error::Warning;
+use crate::scene_file::numbers::MAX_LENGTH;
 use ::gltf::json::Root;
 use ::gltf::json::scene::{Node, Scene};
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
@@ -44,9 +45,9 @@ impl Placed<'_> {
     /// Position of the node's origin, in metres.
     pub(super) fn position(&self) -> Result<Vec3, GltfError> {
         let p = self.world.translation.as_vec3();
-        match p.is_finite() {
+        match p.abs().max_element() <= MAX_LENGTH {
             true => Ok(p),
-            false => Err(self.fault("stands at a position too far away to be represented")),
+            false => Err(self.fault("stands more than 1e12 m from the origin")),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::error::{GltfError, get};
 use super::nodes::Placed;
+use crate::scene_file::numbers::MAX_POWER;
 use ::gltf::json::Root;
 use ::gltf::json::extensions::scene::khr_lights_punctual::{Light, Spot, Type};
 use ::gltf::json::validation::Checked;
@@ -60,11 +61,12 @@ pub(super) fn on_node(
     let pointer = format!("/extensions/KHR_lights_punctual/lights/{index}");
     let color = Vec3::from(light.color);
     let power = color * light.intensity;
-    if !power.is_finite() || color.min_element() < 0.0 || light.intensity < 0.0 {
+    let bounded = power.is_finite() && power.max_element() <= MAX_POWER;
+    if !bounded || color.min_element() < 0.0 || light.intensity < 0.0 {
         return Err(GltfError::value(
             pointer,
             format!("color {:?} with intensity {}", light.color, light.intensity),
-            "both must be finite and not negative",
+            "both must be finite and not negative, and their product at most 1e30",
         ));
     }
     if light.range.is_some() {

@@ -8,13 +8,13 @@ use serde::Deserialize;
 use tyndall_media::MAX_SIGMA_T;
 
 /// Largest distance from the origin, radius or height in metres; its square is far from overflow.
-const MAX_LENGTH: f32 = 1e12;
+pub(crate) const MAX_LENGTH: f32 = 1e12;
 
 /// Largest factor on densities and images.
 const MAX_FACTOR: f32 = 1e12;
 
 /// Largest radiometric quantity, far enough below `f32::MAX` for sums over lights and pixels.
-const MAX_POWER: f32 = 1e30;
+pub(crate) const MAX_POWER: f32 = 1e30;
 
 /// Albedos up to this much above 1 are rounding of the program that wrote the file, and become 1.
 const ALBEDO_ROUNDING: f32 = 1e-6;

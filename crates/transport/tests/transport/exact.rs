@@ -6,6 +6,7 @@
 use crate::rig::{Estimate, Lamps, OPEN, Room, fog, pixel, sphere};
 use glam::Vec3;
 use std::f32::consts::PI;
+use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Ray};
 use tyndall_media::{
     Asymmetry, HenyeyGreenstein, Media, Medium, MediumParams, PhaseFunction, Region,
@@ -356,6 +357,44 @@ fn check_record(
         (across.mean() - slope).abs() < 4.5 * across.error() + 1e-6 * slope.abs(),
         "{name}: sideways gradient"
     );
+}
+
+#[test]
+fn records_know_how_noisy_they_are() {
+    // The spread of values over independent keys against the standard errors told.
+    let lamps = Lamps::points(&[(Vec3::ZERO, 0.25 / PI)]).with_sky(0.02);
+    let media = fog(1.0, 0.8, sphere(3.0), PhaseFunction::Isotropic);
+    let world = World {
+        geometry: &OPEN,
+        lights: &lamps,
+        media: &media,
+    };
+    let n_records = 400;
+    let (mut values, mut slopes) = (Welford::new(), Welford::new());
+    let (mut told_value, mut told_slope) = (0.0, 0.0);
+    for index in 0..n_records {
+        let key = Key {
+            seed: 21,
+            purpose: Purpose::Record,
+            index,
+        };
+        let g = gather::multiple(&world, Vec3::new(0.9, 0.3, -0.2), 256, None, key);
+        values.push(f64::from(g.value.x));
+        slopes.push(f64::from(g.gradient[0].x));
+        told_value += f64::from(g.value_error.x).powi(2) / n_records as f64;
+        told_slope += f64::from(g.gradient_error[0].x).powi(2) / n_records as f64;
+    }
+    for (name, spread, told) in [
+        ("value", values.variance(), told_value),
+        ("gradient", slopes.variance(), told_slope),
+    ] {
+        println!("{name}: variance {spread:.3e}, told {told:.3e}");
+        // A variance of 400 nearly normal values has a standard error of 7 %, six of them with allowance for their tails.
+        assert!(
+            (told / spread - 1.0).abs() < 0.45,
+            "{name}: {told} of {spread}"
+        );
+    }
 }
 
 #[test]
