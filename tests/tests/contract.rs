@@ -339,3 +339,56 @@ fn an_image_compared_with_itself_has_no_error() {
         assert_eq!(numbers[key].as_f64(), Some(0.0), "{key}");
     }
 }
+
+#[test]
+fn outputs_never_replace_what_the_scene_is_read_from() {
+    let folder = TempDir::new().unwrap();
+    for file in fs::read_dir(workspace().join("assets/cornell_box")).unwrap() {
+        let file = file.unwrap();
+        fs::copy(file.path(), folder.path().join(file.file_name())).unwrap();
+    }
+    for file in ["cornell_box.ron", "cornell_box.gltf", "cornell_box.bin"] {
+        let before = fs::read(folder.path().join(file)).unwrap();
+        let command = format!("render cornell_box.ron -o out.exr --width 4 --spp 1 --stats {file}");
+        let output = run_tyndall(folder.path(), &command.split(' ').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(2), "{file}");
+        assert_eq!(fs::read(folder.path().join(file)).unwrap(), before);
+    }
+}
+
+#[test]
+fn a_time_limit_too_short_for_one_sample_a_pixel_still_gives_a_whole_image() {
+    let folder = TempDir::new().unwrap();
+    let scene = workspace().join("assets/hall/hall.ron");
+    let begin = Instant::now();
+    let said = succeed(
+        folder.path(),
+        &format!("render {} -o out.exr --time-limit 0.2", scene.display()),
+    );
+    // 640 × 480 pixels take 10 s at one sample each; a row, which is begun and then ended, a tenth of a second.
+    assert!(begin.elapsed().as_secs_f64() < 8.0);
+    assert!(said.contains("repeat their neighbours"), "{said}");
+    let image = Channels::read(&folder.path().join("out.exr")).unwrap();
+    let pixels = image.rgb("").unwrap().pixels;
+    let lit = pixels.iter().filter(|p| p.max_element() > 0.0).count();
+    assert!(
+        lit * 10 > pixels.len() * 9,
+        "{lit} of {} pixels are lit",
+        pixels.len()
+    );
+}
+
+#[test]
+fn a_comparison_without_a_finite_value_claims_nothing() {
+    let folder = TempDir::new().unwrap();
+    let nan = Image {
+        size: [4, 4],
+        pixels: vec![glam::Vec3::NAN; 16],
+    };
+    nan.write_exr(&folder.path().join("nan.exr")).unwrap();
+    let output = run_tyndall(folder.path(), &["compare", "nan.exr", "nan.exr", "--json"]);
+    let numbers: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(numbers["error"].is_null() && numbers["rmse"].is_null());
+    assert_eq!(numbers["nan"].as_f64(), Some(48.0));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("left out"));
+}

@@ -26,9 +26,9 @@ pub(crate) enum CliError {
         /// All rows.
         rows: usize,
     },
-    /// An output that would replace the scene or another output.
+    /// An output that would replace a file of the scene or another output.
     #[error(
-        "the output would replace the scene file or another output of this command; choose another name: {}", path.display()
+        "the output would replace a file that the scene is read from, or another output of this command; choose another name: {}", path.display()
     )]
     Overwrites {
         /// The output.

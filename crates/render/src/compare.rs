@@ -150,13 +150,20 @@ impl Pairs {
                 reference += f64::from(r);
             }
         }
-        let rmse = (squares / self.counted).max(0.0).sqrt();
+        // Without a single value to compare, no number is known.
+        let squares = if self.counted > 0.0 {
+            squares
+        } else {
+            f64::NAN
+        };
+        let root = |x: f64| if x.is_nan() { x } else { x.max(0.0).sqrt() };
+        let rmse = root(squares / self.counted);
         let rel_mse = relative / self.counted;
         Comparison {
             rmse,
             rel_rmse: rmse / (reference / self.counted),
             rel_mse,
-            error: rel_mse.max(0.0).sqrt(),
+            error: root(rel_mse),
             bias: difference / reference,
             flip: self.flip(width, height, exposure),
             nan: self.nan,

@@ -150,6 +150,27 @@ impl Film {
         image
     }
 
+    /// Gives rows without any sample the sums of the nearest row that has some, as where time ran out in the first pass.
+    pub fn fill_gaps(&mut self) {
+        let width = self.crop.width as usize;
+        let sampled: Vec<usize> = (0..self.crop.height as usize)
+            .filter(|row| self.counts[row * width] != [0, 0])
+            .collect();
+        for row in 0..self.crop.height as usize {
+            let nearest = sampled
+                .iter()
+                .copied()
+                .min_by_key(|other| other.abs_diff(row));
+            if let Some(from) = nearest.filter(|&from| from != row) {
+                self.counts
+                    .copy_within(from * width..(from + 1) * width, row * width);
+                let stride = width * self.stride;
+                self.sums
+                    .copy_within(from * stride..(from + 1) * stride, row * stride);
+            }
+        }
+    }
+
     /// The colour alone, whatever layers were asked for: red, green and blue of every pixel.
     pub fn colour(&self) -> [Vec<f32>; 3] {
         std::array::from_fn(|c| self.beauty(c))

@@ -153,8 +153,7 @@ pub struct RenderOptions {
     pub seed: u64,
     /// Number of threads; all processors where none is given. The image does not depend on it.
     pub threads: Option<usize>,
-    /// When to stop early with the best image so far, counted from the call. Two samples of every pixel are taken however long they
-    /// last: without them there is no image.
+    /// When to stop early with the best image so far, counted from the call.
     pub time_limit: Option<Duration>,
     /// The layers to make.
     pub layers: Option<LayerSet>,

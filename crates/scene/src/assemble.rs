@@ -27,6 +27,8 @@ pub(crate) struct Assembly<'a> {
     pub(crate) options: &'a LoadOptions,
     /// What there was to warn of so far.
     pub(crate) warnings: Vec<Warning>,
+    /// The files read so far.
+    pub(crate) files: Vec<PathBuf>,
 }
 
 impl Assembly<'_> {
@@ -37,6 +39,7 @@ impl Assembly<'_> {
         gltf: GltfScene,
     ) -> Result<Scene, SceneError> {
         self.warnings.extend(gltf.warnings);
+        self.files.extend(gltf.files);
         let film = self.film(file)?;
         let mut media = self.media(file)?;
         let lights = self.lights(file, &gltf.lights)?;
@@ -70,6 +73,7 @@ impl Assembly<'_> {
             media,
             bounds,
             warnings: self.warnings,
+            files: self.files,
         })
     }
 
@@ -151,6 +155,7 @@ impl Assembly<'_> {
                 let (file, _) = self.locate(&environment.file, &field)?;
                 let (image, count) =
                     read_environment(&file).map_err(|error| self.wrong_field(&field, error))?;
+                self.files.push(file.clone());
                 if count > 0 {
                     self.warnings.push(Warning::NegativeTexels { file, count });
                 }

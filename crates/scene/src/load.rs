@@ -70,6 +70,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
                 path,
                 options,
                 warnings: Vec::new(),
+                files: Vec::new(),
             }
             .assemble(&SceneFile::default(), gltf)
         }
@@ -93,6 +94,7 @@ fn load_bytes(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene,
         path,
         options,
         warnings: Vec::new(),
+        files: vec![path.into()],
     };
     let gltf = assembly.read_gltf(&file)?;
     assembly.assemble(&file, gltf)

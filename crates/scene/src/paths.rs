@@ -3,6 +3,7 @@
 //! A scene file or glTF from somewhere else must not make the renderer read a password file or open a connection.
 
 use percent_encoding::percent_decode_str;
+use std::cell::RefCell;
 use std::path::{Component, Path, PathBuf};
 
 /// Where names in a file start from, and the folder that they may not leave.
@@ -11,6 +12,8 @@ pub struct Folder {
     base: PathBuf,
     root: PathBuf,
     allow_external: bool,
+    /// The files found so far.
+    found: RefCell<Vec<PathBuf>>,
 }
 
 /// Why a file that a scene names cannot be used.
@@ -80,6 +83,7 @@ impl Folder {
             base,
             root,
             allow_external,
+            found: RefCell::default(),
         })
     }
 
@@ -97,6 +101,11 @@ impl Folder {
     /// The folder that names may not leave.
     pub fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// The files found so far, as they are to be read.
+    pub fn into_found(self) -> Vec<PathBuf> {
+        self.found.into_inner()
     }
 
     /// The existing file that a percent-encoded relative URI means.
@@ -149,6 +158,7 @@ impl Folder {
                 path: real,
             });
         }
+        self.found.borrow_mut().push(real.clone());
         Ok(real)
     }
 }

@@ -6,6 +6,7 @@ use crate::film::FilmSize;
 use crate::lights::LightSet;
 use crate::triangles::Triangles;
 use glam::Vec3;
+use std::path::PathBuf;
 use tyndall_math::Aabb;
 use tyndall_media::{Density, Media, Medium};
 use tyndall_transport::World;
@@ -29,6 +30,8 @@ pub struct Scene {
     pub bounds: Aabb,
     /// What was repaired, ignored, or will look odd.
     pub warnings: Vec<Warning>,
+    /// The files that the scene was read from.
+    pub files: Vec<PathBuf>,
 }
 
 /// What a scene file asks of the renderer; the command line may ask otherwise.

@@ -11,6 +11,17 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), CliError> {
     let b = read_image(&args.b)?;
     let b2 = args.b2.as_deref().map(read_image).transpose()?;
     let comparison = compare(&a, &b, b2.as_ref(), &args.layer, args.exposure)?;
+    if comparison.nan + comparison.inf > 0 {
+        output::warn([format!(
+            "{} values that are NaN and {} that are infinite were left out",
+            comparison.nan, comparison.inf
+        )]);
+    }
+    if !(comparison.error.is_finite() && comparison.bias.is_finite()) {
+        output::warn([
+            "relative numbers do not exist: the reference is black, or no value is finite in all images",
+        ]);
+    }
     if args.json {
         output::print_json(&comparison)
     } else {

@@ -29,10 +29,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     if let Some(path) = &args.stats {
         check_place(path)?;
     }
-    apart(&args.scene, outputs.iter().chain(&args.stats))?;
-
     let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
+    apart(&scene.files, outputs.iter().chain(&args.stats))?;
     output::warn(&scene.warnings);
+    if args.layers.is_some() && outputs.iter().any(|path| is_png(path)) {
+        output::warn([
+            "a PNG file shows the colour of the image alone; --layers takes effect in .exr files",
+        ]);
+    }
     let load_s = start.elapsed().as_secs_f64();
 
     let bar = Bar::new(args.quiet);
@@ -61,9 +65,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
             stats.wall_s, stats.threads, stats.spp
         ));
         if let Some(error) = &stats.estimated_error {
+            // Few samples may give an estimate of the squared error below 0: all that is known then is the bound.
+            let value = if error.value > 0.0 {
+                format!("{:.2} %", 100.0 * error.value)
+            } else {
+                "too small to tell".to_owned()
+            };
             output::say(&format!(
-                "estimated error {:.2} % (95 %: {:.2} to {:.2} %), bias {:+.2} %",
-                100.0 * error.value,
+                "estimated error {value} (95 %: {:.2} to {:.2} %), bias {:+.2} %",
                 100.0 * error.ci95[0],
                 100.0 * error.ci95[1],
                 100.0 * error.bias
@@ -76,10 +85,18 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Refuses outputs that would replace the scene or one another.
-fn apart<'a>(scene: &Path, outputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), CliError> {
+fn is_png(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
+/// Refuses outputs that would replace a file of the scene or one another.
+fn apart<'a>(
+    inputs: &[PathBuf],
+    outputs: impl Iterator<Item = &'a PathBuf>,
+) -> Result<(), CliError> {
     let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let mut taken = vec![real(scene)];
+    let mut taken: Vec<PathBuf> = inputs.iter().map(|path| real(path)).collect();
     for output in outputs {
         let place = real(output);
         if taken.contains(&place) {

@@ -154,6 +154,8 @@ impl<'s> Run<'s> {
             (None, _) => Multiple::None,
         };
         let (tally, timed_out) = self.sample(&mut film, &multiple);
+        stats.spp = film.mean_samples();
+        film.fill_gaps();
         stats.render_s = rendering.elapsed().as_secs_f64();
 
         let estimating = Instant::now();
@@ -171,7 +173,6 @@ impl<'s> Run<'s> {
         stats.rays += tally.rays + estimate_tally.rays;
         stats.lookups = tally.lookups;
         stats.lookups_missed = tally.missed;
-        stats.spp = film.mean_samples();
         stats.wall_s = self.start.elapsed().as_secs_f64();
         if tally.dropped > 0 {
             notes.push(format!(
@@ -182,6 +183,12 @@ impl<'s> Run<'s> {
         if cut_short {
             notes.push(
                 "the time limit ended the filling of the cache: where records are missing paths are traced, with more noise"
+                    .to_owned(),
+            );
+        }
+        if stats.spp < 1.0 {
+            notes.push(
+                "the time limit left rows of the image without samples: they repeat their neighbours"
                     .to_owned(),
             );
         }
@@ -301,10 +308,13 @@ impl<'s> Run<'s> {
         let rows_done = AtomicUsize::new(0);
         let mut rows = film.rows();
         let n_rows = rows.len();
+        // From coarse to fine over the image, so that rows which time leaves out stand between others. The first is always taken.
+        rows.sort_by_key(|row| (row.y - self.crop.y).reverse_bits());
         let tallies: Vec<Option<Tally>> = rows
             .par_iter_mut()
+            .with_max_len(1)
             .map(|row| {
-                if self.out_of_time() && samples.start > 0 {
+                if self.out_of_time() && (samples.start > 0 || row.y > self.crop.y) {
                     return None;
                 }
                 let tally = self.row(row, samples.clone(), multiple);

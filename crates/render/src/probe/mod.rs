@@ -15,7 +15,7 @@ use serde::Serialize;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose};
 use tyndall_scene::Scene;
-use tyndall_transport::gather;
+use tyndall_transport::{Lights, gather};
 
 /// What to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,9 @@ pub struct ProbeOptions {
     pub seed: u64,
 }
 
+/// Most samples of a probe: a gather keeps some 200 bytes for each.
+const MAX_SAMPLES: u32 = 10_000_000;
+
 /// Why a probe cannot be answered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeError {
@@ -40,6 +43,14 @@ pub enum ProbeError {
         "--samples is {0}, but it must be at least 2: standard errors come from the spread of samples"
     )]
     FewSamples(u32),
+    /// More than memory holds.
+    #[error(
+        "--samples is {0}, but it must be at most {MAX_SAMPLES}; their noise is far below f32 rounding then"
+    )]
+    ManySamples(u32),
+    /// The point is where a lamp without extent stands.
+    #[error("--at is ({}, {}, {}), where a point light stands: scattered light is infinite there; choose a point beside it", .0.x, .0.y, .0.z)]
+    AtLamp(Vec3),
     /// The point is not a place.
     #[error("--at is ({}, {}, {}), but all of its numbers must be finite", .0.x, .0.y, .0.z)]
     Point(Vec3),
@@ -87,8 +98,16 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
     if options.samples < 2 {
         return Err(ProbeError::FewSamples(options.samples));
     }
+    if options.samples > MAX_SAMPLES {
+        return Err(ProbeError::ManySamples(options.samples));
+    }
     if !options.at.is_finite() {
         return Err(ProbeError::Point(options.at));
+    }
+    // Nearer than coordinates can tell, 1/r² and its gradient leave the range of f32.
+    let least = f32::EPSILON * options.at.abs().max_element() + f32::MIN_POSITIVE.sqrt();
+    if scene.lights.distance_to_point_lights(options.at) <= least {
+        return Err(ProbeError::AtLamp(options.at));
     }
     let towards = match options.towards {
         Some(direction) => Some(

@@ -19,12 +19,37 @@ pub(super) type World<'a> = tyndall_transport::World<'a, Solids, Lamps>;
 const REPLICATES: usize = 256;
 /// Independent records at each point.
 const RECORDS: usize = 128;
+/// Relative standard error aimed at.
+const TARGET: f64 = 0.0045;
+/// Share of the samples that a pilot run takes to learn how noisy a place is.
+const PILOT: f64 = 0.1;
+/// Least and largest factor by which a pilot changes the number of samples.
+const FACTORS: [f64; 2] = [0.1, 4.0];
 /// Relative error of f32 path tracing: positions, optical depths and sums of some ten factors.
 pub(super) const ROUNDING: f64 = 3e-5;
 /// The same for gradients, which are sums of terms of both signs.
 const GRADIENT_ROUNDING: f64 = 3e-4;
 
 impl Budget {
+    /// This budget with as many samples as a pilot run says are needed. The pilot has random numbers of its own: its luck
+    /// is not that of the run, which a rule for stopping would make it.
+    fn after(&self, pilot: impl FnOnce(&Budget) -> (f64, f64)) -> Self {
+        let (mean, error) = pilot(&Budget {
+            seed: self.seed ^ 1 << 63,
+            share: self.share * PILOT,
+            ..*self
+        });
+        let [least, most] = FACTORS;
+        let relative = error / mean.abs().max(f64::MIN_POSITIVE);
+        // A quick run aims at less in proportion.
+        let factor = (relative / TARGET).powi(2) * PILOT * self.share;
+        let factor = if factor.is_nan() { 1.0 } else { factor };
+        Self {
+            share: self.share * factor.clamp(least, most),
+            ..*self
+        }
+    }
+
     fn key(&self, replicate: usize) -> Key {
         Key {
             seed: self.seed,
@@ -50,8 +75,21 @@ impl Channel {
     }
 }
 
-/// Radiance of paths that start along `ray` of two random numbers, from about `samples` paths in the full run.
+/// Radiance of paths that start along `ray` of two random numbers, from `samples` paths in the full run, more or fewer where a
+/// pilot run says that its error asks for them.
 pub(super) fn pixel(
+    world: &World<'_>,
+    budget: &Budget,
+    samples: usize,
+    max_depth: Option<u32>,
+    channel: Channel,
+    ray: impl Fn([f32; 2]) -> Ray,
+) -> Welford {
+    let run = |budget: &Budget| replicates(world, budget, samples, max_depth, channel, &ray);
+    run(&budget.after(|pilot| estimate(&run(pilot))))
+}
+
+fn replicates(
     world: &World<'_>,
     budget: &Budget,
     samples: usize,
@@ -108,7 +146,8 @@ pub(super) struct Point {
 
 /// The rows of one point: value, gradient along the exact gradient, and across it.
 ///
-/// Each of the independent records takes `rays` directions in the full run; single scattering takes as many samples.
+/// Each of the independent records takes `rays` directions in the full run, or more where a pilot run says that the value's error
+/// asks for them; single scattering takes as many samples.
 pub(super) fn point_rows(
     world: &World<'_>,
     budget: &Budget,
@@ -119,17 +158,25 @@ pub(super) fn point_rows(
     let exact = glam::DVec3::from(point.gradient);
     let along = exact.normalize_or(glam::DVec3::Y);
     let across = along.any_orthonormal_vector();
-    let mut spread = [Welford::new(); 3];
-    let rays = budget.samples(rays);
-    for replicate in 0..RECORDS {
-        let (value, gradient) = measure(world, budget.key(replicate), rays, point);
-        let gradient = glam::DVec3::from(gradient);
-        let numbers = [value, gradient.dot(along), gradient.dot(across)];
-        for (spread, number) in spread.iter_mut().zip(numbers) {
-            spread.push(number);
+    let run = |budget: &Budget| {
+        let mut spread = [Welford::new(); 3];
+        for replicate in 0..RECORDS {
+            let rays = budget.samples(rays);
+            let (value, gradient) = measure(world, budget.key(replicate), rays, point);
+            let gradient = glam::DVec3::from(gradient);
+            let numbers = [value, gradient.dot(along), gradient.dot(across)];
+            for (spread, number) in spread.iter_mut().zip(numbers) {
+                spread.push(number);
+            }
         }
-    }
-    let [value, slope, side] = &spread;
+        spread
+    };
+    let asked = budget.after(|pilot| estimate(&run(pilot)[0]));
+    // Never fewer than planned: gradients need them.
+    let [value, slope, side] = &run(&Budget {
+        share: asked.share.max(budget.share),
+        ..*budget
+    });
     let rounding = GRADIENT_ROUNDING * exact.length().max(point.value);
     vec![
         Row::random(

@@ -21,6 +21,8 @@ pub(super) struct Materials<'a> {
     places: BTreeMap<Option<usize>, u32>,
     list: Vec<Material>,
     blended: Vec<String>,
+    /// How many materials have textures that are not drawn, by field.
+    undrawn: BTreeMap<&'static str, usize>,
 }
 
 /// `KHR_materials_specular`, which files may use without requiring it.
@@ -52,6 +54,7 @@ impl<'a> Materials<'a> {
             places: BTreeMap::new(),
             list: Vec::new(),
             blended: Vec::new(),
+            undrawn: BTreeMap::new(),
         }
     }
 
@@ -63,6 +66,12 @@ impl<'a> Materials<'a> {
         if !self.blended.is_empty() {
             warnings.push(Warning::BlendDrawnOpaque {
                 materials: self.blended,
+            });
+        }
+        for (field, count) in self.undrawn {
+            warnings.push(Warning::Gltf {
+                problem: format!("{field} of {count} materials is not drawn"),
+                pointer: "/materials".into(),
             });
         }
         (self.list, self.images.into_textures())
@@ -157,6 +166,14 @@ impl<'a> Materials<'a> {
                 problem: format!("material \"{name}\" has factors above 1, which are drawn as 1"),
                 pointer: at.clone(),
             });
+        }
+        for (field, given) in [
+            ("normalTexture", material.normal_texture.is_some()),
+            ("occlusionTexture", material.occlusion_texture.is_some()),
+        ] {
+            if given {
+                *self.undrawn.entry(field).or_default() += 1;
+            }
         }
         let alpha_cutoff = self.alpha_cutoff(material, &name, &at)?;
         let mut map = |info: Option<&Info>| match info {

@@ -59,6 +59,8 @@ pub struct GltfScene {
     pub cameras: Vec<GltfCamera>,
     /// What was repaired or left out.
     pub warnings: Vec<Warning>,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
 }
 
 /// Reads a `.gltf` or `.glb` file.
@@ -76,10 +78,14 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<GltfScene, SceneError>
     if let Some(root) = &options.root {
         folder = folder.confined_to(root).map_err(io_error)?;
     }
-    convert(&bytes, &folder, options.scene.as_deref()).map_err(|error| SceneError::Gltf {
+    let converted = convert(&bytes, &folder, options.scene.as_deref());
+    let mut scene = converted.map_err(|error| SceneError::Gltf {
         error: Box::new(error),
         path: path.into(),
-    })
+    })?;
+    scene.files = folder.into_found();
+    scene.files.push(path.into());
+    Ok(scene)
 }
 
 /// Turns the bytes of a file into a scene.
@@ -121,5 +127,6 @@ fn convert(bytes: &[u8], folder: &Folder, scene: Option<&str>) -> Result<GltfSce
         lights,
         cameras,
         warnings,
+        files: Vec::new(),
     })
 }
