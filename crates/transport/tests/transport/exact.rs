@@ -86,10 +86,11 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
                 lights: &lamps,
                 media: &media,
             };
-            let (layers, estimate) = pixel(&world, ray, Some(1), 200_000);
+            // A sharp lobe beside the lamp varies most along the ray: seven times the samples hold the same bound.
+            let n = if phase == hg(0.9) { 1_400_000 } else { 200_000 };
+            let (layers, estimate) = pixel(&world, ray, Some(1), n);
             assert_eq!(layers.multiple, Vec3::ZERO);
-            // The sharp lobe close to the lamp (HG 0.9, h ≤ 1e-3) is the worst row; the others stay under 0.5 %.
-            estimate.check(&format!("airlight h {h} {phase:?}"), exact, 1.1e-2, 1e-4);
+            estimate.check(&format!("airlight h {h} {phase:?}"), exact, 5e-3, 1e-4);
         }
     }
 }
