@@ -7,6 +7,7 @@ use tyndall_render::error::RenderError;
 use tyndall_render::layers::LayerSet;
 use tyndall_render::options::{Crop, Depth};
 use tyndall_scene::Fog;
+use tyndall_scene::scene_file::numbers::Stops;
 
 /// A point or direction `X,Y,Z`.
 pub(crate) fn vector(text: &str) -> Result<[f32; 3], String> {
@@ -69,10 +70,8 @@ pub(crate) fn finite(text: &str) -> Result<f32, String> {
 
 /// A number of stops, in the range that the scene file allows.
 pub(crate) fn stops(text: &str) -> Result<f32, String> {
-    match *numbers(text)?.as_slice() {
-        [number] if number.abs() <= 100.0 => Ok(number),
-        _ => Err("one number of stops from -100 to 100 is wanted".to_owned()),
-    }
+    let stops = Stops::try_from(f64::from(finite(text)?));
+    stops.map(Stops::get).map_err(str::to_owned)
 }
 
 /// What an error allows, without the option and the value that clap already names.

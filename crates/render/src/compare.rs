@@ -136,9 +136,9 @@ impl Pairs {
             self.r.clone()
         };
         // Values that do not count are 0 here: they neither add to the sum nor to the number.
-        let sum: f64 = self.r.iter().flatten().map(|&r| f64::from(r)).sum();
-        let weights = weights(&smooth, sum / self.counted.max(1.0));
-        let (mut squares, mut relative, mut difference, mut reference) = (0.0, 0.0, 0.0, 0.0);
+        let reference: f64 = self.r.iter().flatten().map(|&r| f64::from(r)).sum();
+        let weights = weights(&smooth, reference / self.counted.max(1.0));
+        let (mut squares, mut relative, mut difference) = (0.0, 0.0, 0.0);
         for (c, a) in self.a.iter().enumerate() {
             let halves = self.halves[0][c].iter().zip(&self.halves[1][c]);
             for (((&a, (&b, &b2)), &r), &w) in a.iter().zip(halves).zip(&self.r[c]).zip(&weights[c])
@@ -147,15 +147,9 @@ impl Pairs {
                 squares += product;
                 relative += weighted(product, w);
                 difference += f64::from(a) - f64::from(r);
-                reference += f64::from(r);
             }
         }
-        // Without a single value to compare, no number is known.
-        let squares = if self.counted > 0.0 {
-            squares
-        } else {
-            f64::NAN
-        };
+        // Without a single value to compare, 0/0 stays NaN: no number is known.
         let root = |x: f64| if x.is_nan() { x } else { x.max(0.0).sqrt() };
         let rmse = root(squares / self.counted);
         let rel_mse = relative / self.counted;

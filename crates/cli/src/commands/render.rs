@@ -7,7 +7,9 @@ use crate::output;
 use crate::progress::Bar;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tyndall_render::image_file::{WriteOptions, check_place, check_writable, write_image};
+use tyndall_render::image_file::{
+    ImageFormat, WriteOptions, check_place, check_writable, write_image,
+};
 use tyndall_render::options::RenderOptions;
 use tyndall_render::{Outcome, render};
 use tyndall_scene::LoadOptions;
@@ -32,7 +34,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
     apart(&scene.files, outputs.iter().chain(&args.stats))?;
     output::warn(&scene.warnings);
-    if args.layers.is_some() && outputs.iter().any(|path| is_png(path)) {
+    let shows_colour_alone = |path: &PathBuf| matches!(ImageFormat::of(path), Ok(ImageFormat::Png));
+    if args.layers.is_some() && outputs.iter().any(shows_colour_alone) {
         output::warn([
             "a PNG file shows the colour of the image alone; --layers takes effect in .exr files",
         ]);
@@ -83,11 +86,6 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         }
     }
     Ok(())
-}
-
-fn is_png(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
 }
 
 /// Refuses outputs that would replace a file of the scene or one another.

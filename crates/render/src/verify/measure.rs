@@ -85,37 +85,28 @@ pub(super) fn pixel(
     channel: Channel,
     ray: impl Fn([f32; 2]) -> Ray,
 ) -> Welford {
-    let run = |budget: &Budget| replicates(world, budget, samples, max_depth, channel, &ray);
-    run(&budget.after(|pilot| estimate(&run(pilot))))
-}
-
-fn replicates(
-    world: &World<'_>,
-    budget: &Budget,
-    samples: usize,
-    max_depth: Option<u32>,
-    channel: Channel,
-    ray: impl Fn([f32; 2]) -> Ray,
-) -> Welford {
-    let n = (budget.samples(samples) / REPLICATES).max(1);
-    let mut replicates = Welford::new();
-    for replicate in 0..REPLICATES {
-        let mut sum = 0.0;
-        for i in 0..n {
-            let mut sampler = Sampler::new(budget.key(replicate), i as u64);
-            let start = Start {
-                ray: ray(sampler.next_2d()),
-                hit: None,
-                first: FirstEvent::Any,
-                max_depth,
-            };
-            let mut visitor = LayerVisitor::default();
-            trace(world, &start, &mut sampler, &mut visitor);
-            sum += channel.of(visitor.layers.beauty());
+    let run = |budget: &Budget| {
+        let n = (budget.samples(samples) / REPLICATES).max(1);
+        let mut replicates = Welford::new();
+        for replicate in 0..REPLICATES {
+            let mut sum = 0.0;
+            for i in 0..n {
+                let mut sampler = Sampler::new(budget.key(replicate), i as u64);
+                let start = Start {
+                    ray: ray(sampler.next_2d()),
+                    hit: None,
+                    first: FirstEvent::Any,
+                    max_depth,
+                };
+                let mut visitor = LayerVisitor::default();
+                trace(world, &start, &mut sampler, &mut visitor);
+                sum += channel.of(visitor.layers.beauty());
+            }
+            replicates.push(sum / n as f64);
         }
-        replicates.push(sum / n as f64);
-    }
-    replicates
+        replicates
+    };
+    run(&budget.after(|pilot| estimate(&run(pilot))))
 }
 
 /// Mean and standard error.
