@@ -324,11 +324,15 @@ mod tests {
     }
 
     fn fill(film: &mut Film, samples: u32, pixel: impl Fn(u32, u32, u32) -> Pixel) {
+        let taken =
+            |row: &FilmRow<'_>, x: u32| row.counts[(x - row.x) as usize].iter().sum::<u32>();
         for mut row in film.rows() {
             for x in row.columns() {
+                let before = taken(&row, x);
                 for s in 0..samples {
                     row.add(x, s, &pixel(x, row.y, s));
                 }
+                assert_eq!(taken(&row, x), before + samples);
             }
         }
     }
