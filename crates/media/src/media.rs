@@ -53,11 +53,13 @@ impl Media {
     /// extinction is 0 over any distance. Transmittance is exp(−τ).
     pub fn optical_depth(&self, ray: &Ray, t_max: f32) -> Vec3 {
         let line = Line::from(ray);
-        self.list
-            .iter()
-            .filter_map(|medium| Piece::new(medium, &line, t_max.into()))
-            .map(|piece| piece.total())
-            .sum()
+        let mut tau = Vec3::ZERO;
+        for medium in &self.list {
+            if let Some(piece) = Piece::new(medium, &line, t_max.into()) {
+                tau += piece.total();
+            }
+        }
+        tau
     }
 
     /// Optical depth between `a` and `b` with its gradients with respect to moving either point.

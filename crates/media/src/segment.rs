@@ -78,15 +78,28 @@ pub(crate) fn depth(sigma_t: Vec3, column: f64) -> Vec3 {
     }
 }
 
+/// exp(−τ) for each channel; one exponential where the channels are alike, as in grey fog.
+#[inline]
+pub fn transmittance(tau: Vec3) -> Vec3 {
+    if tau.x == tau.y && tau.y == tau.z {
+        Vec3::splat((-tau.x).exp())
+    } else {
+        tau.map(|tau| (-tau).exp())
+    }
+}
+
 /// How much more than the total may be asked of [`Segment::distance_at`]: rounding of sums of few f32.
 const TOTAL_ROUNDING: f64 = 1e-6;
 
 impl<'a> Segment<'a> {
     pub(crate) fn new(media: &'a [Medium], line: &Line, t_max: f32) -> Self {
-        let pieces = media
-            .iter()
-            .filter_map(|medium| Piece::new(medium, line, t_max.into()))
-            .collect();
+        // A loop: `collect` into a `SmallVec` costs some hundred instructions even for one medium.
+        let mut pieces = SmallVec::new();
+        for medium in media {
+            if let Some(piece) = Piece::new(medium, line, t_max.into()) {
+                pieces.push(piece);
+            }
+        }
         Self { pieces }
     }
 

@@ -37,6 +37,8 @@ pub struct Met {
     pub position: Vec3,
     /// Unit normal of the side on which the corners wind counter-clockwise.
     pub front_normal: Vec3,
+    /// Bound on the length of its sides, in metres.
+    pub size: f32,
 }
 
 impl Hierarchy {
@@ -125,6 +127,7 @@ impl Hierarchy {
             hit: TriangleHit { t, barycentric },
             position: position / self.scale,
             front_normal: geometric_normal([a, b, c]),
+            size: hit_size([a, b, c]) / self.scale,
         })
     }
 
@@ -168,6 +171,19 @@ impl Hierarchy {
 pub(crate) fn geometric_normal(corners: [Vec3; 3]) -> Vec3 {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3()
+}
+
+/// What rounding of a hit is in proportion to: the longest side of a triangle, for a needle as many times as the side is longer
+/// than the triangle is wide. No more than 64 times: a step off the surface must stay far below the needle's own width.
+fn hit_size(corners: [Vec3; 3]) -> f32 {
+    const SLENDEREST: f32 = 64.0;
+    let [a, b, c] = corners;
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
+    let double_area = (b - a).cross(c - a).length().max(f32::MIN_POSITIVE);
+    longest.sqrt() * (longest / double_area).clamp(1.0, SLENDEREST)
 }
 
 /// The three steps of `obvhs`'s `build_cwbvh` with its `medium_build` preset, without its debug check, whose tolerance is an

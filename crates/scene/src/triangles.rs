@@ -105,6 +105,7 @@ impl Geometry for Triangles {
             hit,
             position,
             front_normal,
+            size,
         } = self
             .hierarchy
             .nearest(ray, t_max, |triangle, hit| self.is_solid(triangle, hit))?;
@@ -135,6 +136,7 @@ impl Geometry for Triangles {
             } else {
                 self.light_of_triangle.get(&triangle).copied()
             },
+            size,
         })
     }
 

@@ -201,6 +201,40 @@ fn scenes_of_any_size_are_as_tight() {
 }
 
 #[test]
+fn no_ray_meets_again_the_triangle_it_leaves() {
+    // Sizes from a millimetre to a kilometre, up to a hundred times as far from the origin, needles of 1 : 1000, and
+    // directions down to 10⁻⁴ above the surface.
+    for i in 0..100_000 {
+        let mut s = random(77, i);
+        let mut vec = || Vec3::new(s.next_1d(), s.next_1d(), s.next_1d()) * 2.0 - 1.0;
+        let [a, b, c, shift, from, turn] = std::array::from_fn(|_| vec());
+        let mut power = |from: f32, to: f32| 10f32.powf(from + (to - from) * s.next_1d());
+        let size = power(-3.0, 3.0);
+        let shift = shift * power(-4.0, 2.0) * size;
+        let needle = [a, a + (b - a) * power(-3.0, 0.0), c];
+        let corners = needle.map(|p| p * size + shift);
+        let (origin_at, cos) = (power(-2.0, 1.0) * size, power(-4.0, 0.0));
+
+        let [u, v, w] = warp::uniform_triangle(s.next_2d());
+        let target = corners[0] * u + corners[1] * v + corners[2] * w;
+        let origin = target + from * origin_at;
+        let ray = Ray::new(origin, (target - origin).normalize());
+        let one = triangles(corners.to_vec(), vec![[0, 1, 2]]);
+        // Where the ray grazes a needle, rounding makes it miss.
+        let Some(hit) = one.intersect(&ray, f32::INFINITY) else {
+            continue;
+        };
+        let tangent = turn.cross(hit.normal).normalize();
+        let w_i = (tangent * (1.0 - cos * cos).sqrt() + hit.normal * cos).normalize();
+        let leaving = hit.spawn(w_i);
+        assert!(
+            !one.occluded(&leaving, f32::INFINITY),
+            "{corners:?} met again from {leaving:?}"
+        );
+    }
+}
+
+#[test]
 fn a_hit_closer_than_a_tenth_of_a_millimetre_is_found() {
     let (positions, indices) = icosphere(2);
     let sphere = triangles(positions, indices);

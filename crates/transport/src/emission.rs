@@ -32,7 +32,7 @@ pub fn sample<'m, G, L>(
     }
     let (t, pdf) = distance(flight, u)?;
     let medium = world.media.at(ray.at(t));
-    let value = flight.transmittance_to(t) * medium.emission / pdf;
+    let value = flight.stop(t).transmittance * medium.emission / pdf;
     (value.is_finite() && value != Vec3::ZERO).then_some(EmissionSample { t, value, medium })
 }
 
@@ -53,7 +53,7 @@ fn distance(flight: &FreeFlight<'_>, u: f32) -> Option<(f32, f32)> {
     };
     let mut pdf = (1.0 - share)
         * if share < 1.0 {
-            flight.pdf_inside(t)
+            flight.pdf_inside(&flight.stop(t))
         } else {
             0.0
         };

@@ -4,7 +4,7 @@
 //! importance sampling, Wilkie et al. 2014), so coloured extinction costs no variance in the channels not picked.
 
 use glam::Vec3;
-use tyndall_media::Segment;
+use tyndall_media::{Segment, transmittance};
 
 /// Samples scattering distances on a [`Segment`] in proportion to σt T.
 #[derive(Clone, Debug)]
@@ -19,6 +19,17 @@ pub struct FreeFlight<'m> {
     stopped: Vec3,
 }
 
+/// A place where a flight ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    /// Distance along the segment's ray.
+    pub t: f32,
+    /// Transmittance up to there.
+    pub transmittance: Vec3,
+    /// σt T, per metre.
+    flux: Vec3,
+}
+
 impl<'m> FreeFlight<'m> {
     /// Flights along `segment` of a path with RGB `throughput` (not negative, not all zero).
     pub fn new(segment: Segment<'m>, throughput: Vec3) -> Self {
@@ -31,7 +42,11 @@ impl<'m> FreeFlight<'m> {
             weights,
             inside_weights: if sum > 0.0 { inside / sum } else { Vec3::ZERO },
             // 1 − T by expm1 keeps its digits in thin media.
-            stopped: total.map(|tau| -(-tau).exp_m1()),
+            stopped: if total.x == total.y && total.y == total.z {
+                Vec3::splat(-(-total.x).exp_m1())
+            } else {
+                total.map(|tau| -(-tau).exp_m1())
+            },
             segment,
         }
     }
@@ -43,12 +58,17 @@ impl<'m> FreeFlight<'m> {
 
     /// Transmittance of the whole segment.
     pub fn transmittance(&self) -> Vec3 {
-        self.total.map(|tau| (-tau).exp())
+        transmittance(self.total)
     }
 
-    /// Transmittance up to distance `t`.
-    pub fn transmittance_to(&self, t: f32) -> Vec3 {
-        self.segment.optical_depth(t).map(|tau| (-tau).exp())
+    /// What the densities of a flight that ends at distance `t` are made of.
+    pub fn stop(&self, t: f32) -> Stop {
+        let transmittance = transmittance(self.segment.optical_depth(t));
+        Stop {
+            t,
+            transmittance,
+            flux: self.segment.sigma_t(t) * transmittance,
+        }
     }
 
     /// Whether the path can scatter anywhere on the segment.
@@ -66,12 +86,9 @@ impl<'m> FreeFlight<'m> {
         self.segment.distance_at(channel, tau)
     }
 
-    /// Density per metre of a flight that ends at `t`: Σ w σt T.
-    pub fn pdf(&self, t: f32) -> f32 {
-        mixture(
-            self.weights,
-            self.segment.sigma_t(t) * self.transmittance_to(t),
-        )
+    /// Density per metre of a flight that ends at `stop`: Σ w σt T.
+    pub fn pdf(&self, stop: &Stop) -> f32 {
+        mixture(self.weights, stop.flux)
     }
 
     /// Chance of passing the whole segment: Σ w T.
@@ -89,21 +106,14 @@ impl<'m> FreeFlight<'m> {
     }
 
     /// Density per metre of [`FreeFlight::sample_inside`]: Σ w σt T / (1 − T of all).
-    pub fn pdf_inside(&self, t: f32) -> f32 {
-        let flux = self.segment.sigma_t(t) * self.transmittance_to(t);
-        (0..3)
-            .filter(|&c| self.inside_weights[c] > 0.0)
-            .map(|c| self.inside_weights[c] * flux[c] / self.stopped[c])
-            .sum()
+    pub fn pdf_inside(&self, stop: &Stop) -> f32 {
+        mixture(self.inside_weights, stop.flux / self.stopped)
     }
 }
 
 /// Σ w x over the channels that can be picked; a channel of weight 0 stays out even if x is not finite.
 fn mixture(weights: Vec3, x: Vec3) -> f32 {
-    (0..3)
-        .filter(|&c| weights[c] > 0.0)
-        .map(|c| weights[c] * x[c])
-        .sum()
+    Vec3::select(weights.cmpgt(Vec3::ZERO), weights * x, Vec3::ZERO).element_sum()
 }
 
 /// Picks a channel with chance `weights` and returns what is left of the random number, again uniform in [0, 1).

@@ -32,20 +32,27 @@ impl LampDirections {
         share: f32,
         sigma: f32,
     ) -> Self {
-        let lamps: SmallVec<[(Vec3, f32); 8]> = (0..lights.count())
-            .filter_map(|l| {
-                let chance = share * choice.pdf(l);
-                if chance < LEAST_CHANCE {
-                    return None;
-                }
-                let offset = lights.pivot(l)? - p;
-                let distance = offset.length();
+        let mut lamps = SmallVec::new();
+        let mut total = 0.0;
+        for light in 0..lights.count() {
+            let chance = share * choice.pdf(light);
+            if chance < LEAST_CHANCE {
+                continue;
+            }
+            let Some(offset) = lights.pivot(light).map(|pivot| pivot - p) else {
+                continue;
+            };
+            let distance = offset.length();
+            if distance > 0.0 {
                 let chance = chance * damping(sigma * distance);
-                (distance > 0.0).then(|| (offset / distance, chance))
-            })
-            .collect();
-        let share = lamps.iter().map(|l| l.1).sum();
-        Self { lamps, share }
+                lamps.push((offset / distance, chance));
+                total += chance;
+            }
+        }
+        Self {
+            lamps,
+            share: total,
+        }
     }
 
     /// The share of directions that lamps get, in [0, 1); the rest is left to the other way of sampling.

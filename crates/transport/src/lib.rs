@@ -38,7 +38,7 @@
 //!     fn sample(&self, _: usize, p: Vec3, _: [f32; 2]) -> Option<LightSample> {
 //!         let distance = p.length();
 //!         let radiance = Vec3::splat(1.0 / (distance * distance));
-//!         Some(LightSample { w_i: -p / distance, distance, radiance, pdf: 1.0, delta: true, normal: Vec3::ZERO })
+//!         Some(LightSample { w_i: -p / distance, distance, radiance, pdf: 1.0, delta: true, normal: Vec3::ZERO, size: 0.0 })
 //!     }
 //!     fn pdf(&self, _: usize, _: Vec3, _: Vec3) -> f32 { 0.0 }
 //!     // Which of many lights to ask, and where on a ray: estimates that steer samples.

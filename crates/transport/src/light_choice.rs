@@ -61,15 +61,14 @@ impl LightChoice {
 
     fn sum(count: usize, importance: impl Fn(usize) -> f32) -> Self {
         let mut total = 0.0;
-        let cumulative = (0..count)
-            .map(|l| {
-                let weight = importance(l);
-                if weight.is_finite() {
-                    total += weight.max(0.0);
-                }
-                total
-            })
-            .collect();
+        let mut cumulative = SmallVec::with_capacity(count);
+        for light in 0..count {
+            let weight = importance(light);
+            if weight.is_finite() {
+                total += weight.max(0.0);
+            }
+            cumulative.push(total);
+        }
         Self { cumulative }
     }
 

@@ -7,7 +7,7 @@ use crate::emission;
 use crate::free_flight::FreeFlight;
 use crate::lamp_directions::LampDirections;
 use crate::light_choice::LightChoice;
-use crate::single::{SegmentLight, unoccluded};
+use crate::single::{DensityAt, SegmentLight, unoccluded};
 use crate::world::{Geometry, LightSample, Lights, SurfaceHit, World};
 use glam::Vec3;
 use tyndall_math::{Ray, Sampler};
@@ -85,31 +85,26 @@ pub struct Start {
 }
 
 /// How the last vertex could also have found a light, for multiple importance sampling.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one stands on the stack per path; a box would allocate at every vertex"
-)]
-enum Rival<'m> {
+enum Rival {
     /// The path has just started: nothing else looks for lights from here.
     None,
     /// Next-event estimation at a surface.
     Surface { choice: LightChoice, pdf: f32 },
-    /// Next-event estimation along the segment on which the vertex lies at distance `t`.
+    /// Next-event estimation along the segment on which the vertex lies.
     Segment {
-        lights: SegmentLight<'m>,
-        t: f32,
+        density: DensityAt,
         /// Density of the path's own way: free flight times phase function.
         pdf: f32,
     },
 }
 
-impl Rival<'_> {
+impl Rival {
     /// Weight of finding `light` in direction `w_i` from `p` by the path's own sampling (power heuristic).
     fn weight<L: Lights>(&self, lights: &L, light: usize, p: Vec3, w_i: Vec3) -> f32 {
         let (own, other) = match self {
             Rival::None => return 1.0,
             Rival::Surface { choice, pdf } => (*pdf, choice.pdf(light)),
-            Rival::Segment { lights: s, t, pdf } => (*pdf, s.pdf(lights, light, *t)),
+            Rival::Segment { density, pdf } => (*pdf, density.of(lights, light)),
         };
         if other <= 0.0 {
             return 1.0;
@@ -195,20 +190,25 @@ pub fn trace<'m, G: Geometry, L: Lights>(
         match (stop, &hit) {
             (Some(t), _) => {
                 let x = ray.at(t);
+                let stop = flight.stop(t);
                 let medium = world.media.at(x);
                 let w_o = -ray.direction;
-                roulette = sampler.next_1d();
+                // There is no choice of lobes here.
+                roulette = lobe;
                 let lamps = lamps_in_fog(world.lights, x, &medium);
                 let w_i = scattered_direction(&medium, &lamps, w_o, direction);
                 let direction_pdf = direction_pdf(&medium, &lamps, w_o, w_i);
                 let pdf = if first == FirstEvent::Medium {
-                    flight.pdf_inside(t)
+                    flight.pdf_inside(&stop)
                 } else {
-                    flight.pdf(t)
+                    flight.pdf(&stop)
                 } * direction_pdf;
-                throughput *= flight.transmittance_to(t) * medium.scattering(w_o, w_i) / pdf;
+                throughput *= stop.transmittance * medium.scattering(w_o, w_i) / pdf;
                 visitor.vertex(Vertex::Medium(x, &medium));
-                rival = lights.map_or(Rival::None, |lights| Rival::Segment { lights, t, pdf });
+                rival = lights.map_or(Rival::None, |lights| Rival::Segment {
+                    density: lights.density_at(&stop),
+                    pdf,
+                });
                 ray = Ray::new(x, w_i);
             }
             (None, Some(hit)) => {
@@ -274,7 +274,7 @@ fn seen_surface<G: Geometry, L: Lights>(
     ray: &Ray,
     hit: &SurfaceHit,
     throughput: Vec3,
-    rival: &Rival<'_>,
+    rival: &Rival,
     visitor: &mut impl Visitor,
 ) {
     if hit.emission == Vec3::ZERO {
@@ -294,7 +294,7 @@ fn seen_environment<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     ray: &Ray,
     throughput: Vec3,
-    rival: &Rival<'_>,
+    rival: &Rival,
     visitor: &mut impl Visitor,
 ) {
     for &light in world.lights.environment() {
@@ -311,7 +311,7 @@ fn seen_environment<G: Geometry, L: Lights>(
 /// Light that reaches the stretch straight from a light and is scattered into the path there.
 fn scattered_once<'m, G: Geometry, L: Lights>(
     world: &World<'m, G, L>,
-    lights: &SegmentLight<'m>,
+    lights: &SegmentLight<'_, 'm>,
     throughput: Vec3,
     (u, v, w): (f32, f32, [f32; 2]),
     visitor: &mut impl Visitor,
@@ -319,13 +319,13 @@ fn scattered_once<'m, G: Geometry, L: Lights>(
     let Some(s) = lights.sample(world, u, v, w) else {
         return;
     };
-    let x = lights.ray().at(s.t);
+    let x = lights.ray().at(s.stop.t);
     let weight = if s.light.delta {
         1.0
     } else {
         let lamps = lamps_in_fog(world.lights, x, &s.medium);
         let w_o = -lights.ray().direction;
-        let own = lights.flight().pdf(s.t) * direction_pdf(&s.medium, &lamps, w_o, s.light.w_i);
+        let own = lights.flight().pdf(&s.stop) * direction_pdf(&s.medium, &lamps, w_o, s.light.w_i);
         power_heuristic(s.pdf, own)
     };
     visitor.light(

@@ -3,12 +3,12 @@
 //! A light is chosen for the whole segment, then the distance by a mixture of equiangular sampling around the light
 //! (Kulla and Fajardo 2012), which cancels the pole of 1/r², and of sampling by transmittance.
 
-use crate::free_flight::FreeFlight;
+use crate::free_flight::{FreeFlight, Stop};
 use crate::light_choice::LightChoice;
 use crate::world::{Geometry, LightSample, Lights, World};
 use glam::Vec3;
 use tyndall_math::{Ray, offset_origin, warp::Equiangular};
-use tyndall_media::MediumPoint;
+use tyndall_media::{MediumPoint, transmittance};
 
 /// Share of equiangular samples where the light is near enough to have a place.
 const EQUIANGULAR_SHARE: f32 = 0.5;
@@ -18,17 +18,51 @@ const CHOICE_DEPTH: f32 = 8.0;
 
 /// Samples single scattering on one segment.
 #[derive(Clone, Debug)]
-pub struct SegmentLight<'m> {
+pub struct SegmentLight<'f, 'm> {
     ray: Ray,
-    flight: FreeFlight<'m>,
+    flight: &'f FreeFlight<'m>,
     choice: LightChoice,
+}
+
+/// The density with which [`SegmentLight::sample`] would have found lights from one of its distances.
+#[derive(Clone, Debug)]
+pub struct DensityAt {
+    ray: Ray,
+    range: (f32, f32),
+    choice: LightChoice,
+    t: f32,
+    by_transmittance: f32,
+}
+
+impl DensityAt {
+    /// Density per metre of picking `light` and this distance.
+    pub fn of<L: Lights>(&self, lights: &L, light: usize) -> f32 {
+        let chance = self.choice.pdf(light);
+        if chance <= 0.0 {
+            return 0.0;
+        }
+        let (start, end) = self.range;
+        chance
+            * lights.pivot(light).map_or(self.by_transmittance, |pivot| {
+                mixed(
+                    &Equiangular::new(&self.ray, pivot, start, end),
+                    self.t,
+                    self.by_transmittance,
+                )
+            })
+    }
+}
+
+/// Density per metre of a distance `t` from the two ways of picking one.
+fn mixed(equiangular: &Equiangular, t: f32, by_transmittance: f32) -> f32 {
+    EQUIANGULAR_SHARE * equiangular.pdf(t) + (1.0 - EQUIANGULAR_SHARE) * by_transmittance
 }
 
 /// Light scattered once on a segment.
 #[derive(Clone, Debug)]
 pub struct SegmentSample<'m> {
-    /// Distance along the ray at which the light is scattered.
-    pub t: f32,
+    /// Where on the ray the light is scattered.
+    pub stop: Stop,
     /// T σs p L towards the ray's origin, over the sample's density.
     pub value: Vec3,
     /// The medium at that point.
@@ -39,12 +73,12 @@ pub struct SegmentSample<'m> {
     pub pdf: f32,
 }
 
-impl<'m> SegmentLight<'m> {
+impl<'f, 'm> SegmentLight<'f, 'm> {
     /// Prepares for `ray`; `None` where nothing on it scatters or there is no light.
     pub fn new<G: Geometry, L: Lights>(
         world: &World<'m, G, L>,
         ray: &Ray,
-        flight: &FreeFlight<'m>,
+        flight: &'f FreeFlight<'m>,
     ) -> Option<Self> {
         if !flight.can_stop() || world.lights.count() == 0 {
             return None;
@@ -60,7 +94,7 @@ impl<'m> SegmentLight<'m> {
         let from = Ray::new(ray.at(start), ray.direction);
         Some(Self {
             ray: *ray,
-            flight: flight.clone(),
+            flight,
             choice: LightChoice::along(
                 world.lights,
                 &from,
@@ -77,32 +111,17 @@ impl<'m> SegmentLight<'m> {
 
     /// Flights along the segment.
     pub fn flight(&self) -> &FreeFlight<'m> {
-        &self.flight
+        self.flight
     }
 
-    /// Density per metre with which this light and distance are picked.
-    pub fn pdf<L: Lights>(&self, lights: &L, light: usize, t: f32) -> f32 {
-        let chance = self.choice.pdf(light);
-        if chance > 0.0 {
-            chance * self.distance_pdf(lights.pivot(light), t)
-        } else {
-            0.0
-        }
-    }
-
-    fn equiangular(&self, pivot: Vec3) -> Equiangular {
-        let (start, end) = self.flight.segment().range();
-        Equiangular::new(&self.ray, pivot, start, end)
-    }
-
-    fn distance_pdf(&self, pivot: Option<Vec3>, t: f32) -> f32 {
-        let by_transmittance = self.flight.pdf_inside(t);
-        match pivot {
-            None => by_transmittance,
-            Some(pivot) => {
-                EQUIANGULAR_SHARE * self.equiangular(pivot).pdf(t)
-                    + (1.0 - EQUIANGULAR_SHARE) * by_transmittance
-            }
+    /// The density with which lights are found from `stop`.
+    pub fn density_at(self, stop: &Stop) -> DensityAt {
+        DensityAt {
+            ray: self.ray,
+            range: self.flight.segment().range(),
+            choice: self.choice,
+            t: stop.t,
+            by_transmittance: self.flight.pdf_inside(stop),
         }
     }
 
@@ -117,32 +136,40 @@ impl<'m> SegmentLight<'m> {
         w: [f32; 2],
     ) -> Option<SegmentSample<'m>> {
         let (light, chance) = self.choice.sample(u)?;
-        let pivot = world.lights.pivot(light);
-        let t = match pivot {
-            Some(pivot) if v < EQUIANGULAR_SHARE => {
-                self.equiangular(pivot).sample(v / EQUIANGULAR_SHARE).0
+        let (start, end) = self.flight.segment().range();
+        let equiangular = world
+            .lights
+            .pivot(light)
+            .map(|pivot| Equiangular::new(&self.ray, pivot, start, end));
+        let t = match &equiangular {
+            Some(equiangular) if v < EQUIANGULAR_SHARE => {
+                equiangular.sample(v / EQUIANGULAR_SHARE).0
             }
             Some(_) => self
                 .flight
                 .sample_inside((v - EQUIANGULAR_SHARE) / (1.0 - EQUIANGULAR_SHARE))?,
             None => self.flight.sample_inside(v)?,
         };
-        let transmittance = self.flight.transmittance_to(t);
-        if transmittance.max_element() <= 0.0 {
+        let stop = self.flight.stop(t);
+        if stop.transmittance.max_element() <= 0.0 {
             return None;
         }
+        let by_transmittance = self.flight.pdf_inside(&stop);
+        let distance_pdf = equiangular
+            .as_ref()
+            .map_or(by_transmittance, |e| mixed(e, t, by_transmittance));
         let x = self.ray.at(t);
         let medium = world.media.at(x);
         let sample = world.lights.sample(light, x, w)?;
         let scattering = medium.scattering(-self.ray.direction, sample.w_i);
-        let pdf = chance * self.distance_pdf(pivot, t) * sample.pdf;
-        let value = transmittance * scattering * sample.radiance / pdf;
+        let pdf = chance * distance_pdf * sample.pdf;
+        let value = stop.transmittance * scattering * sample.radiance / pdf;
         if !value.is_finite() || value.max_element() <= 0.0 {
             return None;
         }
         let arrives = unoccluded(world, x, x, &sample)?;
         Some(SegmentSample {
-            t,
+            stop,
             value: value * arrives,
             medium,
             light: sample,
@@ -179,7 +206,7 @@ pub fn unoccluded<G: Geometry, L>(
         let target = if light.normal == Vec3::ZERO {
             point
         } else {
-            offset_origin(point, light.normal)
+            offset_origin(point, light.normal, light.size)
         };
         let distance = target.distance(origin);
         let direction = (target - origin).try_normalize()?;
@@ -197,10 +224,5 @@ pub fn unoccluded<G: Geometry, L>(
     if world.media.is_empty() {
         return Some(Vec3::ONE);
     }
-    Some(
-        world
-            .media
-            .optical_depth(&ray, distance)
-            .map(|tau| (-tau).exp()),
-    )
+    Some(transmittance(world.media.optical_depth(&ray, distance)))
 }

@@ -31,13 +31,16 @@ pub struct SurfaceHit {
     pub emission: Vec3,
     /// Index of the light this surface belongs to, where it emits.
     pub light: Option<usize>,
+    /// Extent in metres of the flat piece of surface hit, or of a curved one: with the position it bounds the rounding of hits
+    /// (see [`offset_origin`]).
+    pub size: f32,
 }
 
 impl SurfaceHit {
     /// A ray that leaves the surface along `direction` without meeting it again.
     pub fn spawn(&self, direction: Vec3) -> Ray {
         let side = self.normal * self.normal.dot(direction).signum();
-        Ray::new(offset_origin(self.position, side), direction)
+        Ray::new(offset_origin(self.position, side, self.size), direction)
     }
 }
 
@@ -94,6 +97,8 @@ pub struct LightSample {
     pub delta: bool,
     /// Unit normal of the emitter at the sample, towards the point; zero where it has none.
     pub normal: Vec3,
+    /// Extent of the emitter in metres, as [`SurfaceHit::size`]; 0 where it has no surface.
+    pub size: f32,
 }
 
 /// Everything light meets.

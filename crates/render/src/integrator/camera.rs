@@ -123,7 +123,7 @@ impl<'s> Camera<'s> {
             single: layers.single,
             multiple: layers.multiple,
             emission: layers.emission,
-            transmittance: tau.map(|tau| (-tau).exp()),
+            transmittance: tyndall_media::transmittance(tau),
             depth: hit.map_or(0.0, |h| h.t),
         }
     }
@@ -252,8 +252,8 @@ impl<'s> Camera<'s> {
                 },
                 Vec3::from,
             );
-            sum +=
-                flight.transmittance_to(t) * media.at(x).sigma_s * radiance / flight.pdf_inside(t);
+            let stop = flight.stop(t);
+            sum += stop.transmittance * media.at(x).sigma_s * radiance / flight.pdf_inside(&stop);
         }
         self.lookups.set(self.lookups.get() + looked);
         self.missed.set(self.missed.get() + missed);

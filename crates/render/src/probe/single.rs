@@ -44,6 +44,8 @@ struct Way {
     distance: f32,
     /// Unit normal of the emitter, zero where it has none.
     normal: Vec3,
+    /// Extent of the emitter in metres, 0 where it has no surface.
+    size: f32,
     light: Option<usize>,
     delta: bool,
 }
@@ -103,6 +105,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Point<'w, 'm, G, L> {
             w_i: s.w_i,
             distance: s.distance,
             normal: s.normal,
+            size: s.size,
             light: Some(light),
             delta: s.delta,
         };
@@ -117,24 +120,25 @@ impl<'w, 'm, G: Geometry, L: Lights> Point<'w, 'm, G, L> {
             });
             1.0 / (pdf + other)
         };
-        let way = |light, distance, normal| Way {
+        let way = |light, distance, normal, size| Way {
             w_i,
             distance,
             normal,
+            size,
             light,
             delta: false,
         };
         let ray = Ray::new(self.x, w_i);
         match self.world.geometry.intersect(&ray, f32::INFINITY) {
             Some(hit) if hit.emission != Vec3::ZERO => {
-                let way = way(hit.light, hit.t, hit.normal);
+                let way = way(hit.light, hit.t, hit.normal, hit.size);
                 self.add(&way, hit.emission * weight(hit.light), gradient, sum);
             }
             Some(_) => {}
             None => {
                 for &light in self.world.lights.environment() {
                     let radiance = self.world.lights.environment_radiance(light, w_i);
-                    let way = way(Some(light), f32::INFINITY, Vec3::ZERO);
+                    let way = way(Some(light), f32::INFINITY, Vec3::ZERO, 0.0);
                     self.add(&way, radiance * weight(Some(light)), gradient, sum);
                 }
             }
@@ -153,6 +157,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Point<'w, 'm, G, L> {
             pdf: 1.0,
             delta: way.delta,
             normal: way.normal,
+            size: way.size,
         };
         let Some(arrives) = unoccluded(self.world, self.x, self.x, &light) else {
             return;

@@ -62,6 +62,14 @@ impl Shape {
             }
         }
     }
+
+    /// A bound on the distance of two of its points, in metres.
+    fn size(&self) -> f32 {
+        match *self {
+            Shape::Sphere { radius, .. } | Shape::Disk { radius, .. } => 2.0 * radius,
+            Shape::Rectangle { edges: [a, b], .. } => a.length() + b.length(),
+        }
+    }
 }
 
 /// An opaque Lambertian thing.
@@ -124,6 +132,7 @@ impl Geometry for Solids {
             bsdf: Bsdf::lambert(Vec3::splat(solid.reflectance), normal),
             emission: Vec3::splat(solid.emission),
             light: solid.lamp,
+            size: solid.shape.size(),
         })
     }
 
@@ -261,6 +270,7 @@ impl Lights for Lamps {
                     pdf: 1.0,
                     delta: true,
                     normal: Vec3::ZERO,
+                    size: 0.0,
                 })
             }
             Lamp::Sky { radiance, side } => {
@@ -274,6 +284,7 @@ impl Lights for Lamps {
                     pdf: self.pdf(light, p, w_i),
                     delta: false,
                     normal: Vec3::ZERO,
+                    size: 0.0,
                 })
             }
             Lamp::Solid { shape, radiance } => {
@@ -295,6 +306,7 @@ impl Lights for Lamps {
                     pdf: self.pdf(light, p, w_i),
                     delta: false,
                     normal: if n.dot(w_i) > 0.0 { -n } else { n },
+                    size: shape.size(),
                 })
             }
         }

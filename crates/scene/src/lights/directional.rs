@@ -48,6 +48,7 @@ impl DirectionalLight {
             pdf: 1.0,
             delta: true,
             normal: Vec3::ZERO,
+            size: 0.0,
         })
     }
 }

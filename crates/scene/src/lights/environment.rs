@@ -175,6 +175,7 @@ impl EnvironmentLight {
             pdf,
             delta: false,
             normal: Vec3::ZERO,
+            size: 0.0,
         })
     }
 

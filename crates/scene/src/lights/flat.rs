@@ -57,6 +57,11 @@ impl FlatEmitter {
         self.area
     }
 
+    /// A bound on the distance of two of its points, in metres.
+    pub(super) fn size(&self) -> f32 {
+        2.0 * self.radius_squared.sqrt()
+    }
+
     /// What it emits.
     pub fn emission(&self) -> &Emission {
         &self.emission

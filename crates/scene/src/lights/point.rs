@@ -71,6 +71,7 @@ pub(super) fn towards_lamp(
             pdf: 1.0,
             delta: true,
             normal: Vec3::ZERO,
+            size: 0.0,
         },
     )
 }

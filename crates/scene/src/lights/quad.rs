@@ -67,6 +67,7 @@ impl QuadLight {
             pdf: 1.0 / seen.solid_angle(),
             delta: false,
             normal,
+            size: self.flat.size(),
         })
     }
 

@@ -44,6 +44,7 @@ impl SkyLight {
             pdf: self.pdf(),
             delta: false,
             normal: Vec3::ZERO,
+            size: 0.0,
         })
     }
 

@@ -55,6 +55,7 @@ impl TriangleLight {
             pdf: 1.0 / seen.solid_angle(),
             delta: false,
             normal,
+            size: self.flat.size(),
         })
     }
 

@@ -38,6 +38,7 @@ impl Geometry for Room {
             bsdf: Bsdf::lambert(Vec3::splat(self.reflectance), normal),
             emission: Vec3::splat(self.emission),
             light: None,
+            size: self.radius,
         })
     }
 
@@ -113,6 +114,7 @@ impl Lights for Lamps {
                     pdf: 1.0,
                     delta: true,
                     normal: Vec3::ZERO,
+                    size: 0.0,
                 }
             }
             None => LightSample {
@@ -122,6 +124,7 @@ impl Lights for Lamps {
                 pdf: 0.25 / PI,
                 delta: false,
                 normal: Vec3::ZERO,
+                size: 0.0,
             },
         })
     }

@@ -99,8 +99,12 @@ fn free_flights_follow_their_density_in_all_channels_at_once() {
         assert_conforms(
             &cells,
             seed,
-            |u| flight.sample(u[0]).map(|t| (t, flight.pdf(t))),
-            |t| flight.pdf(t),
+            |u| {
+                flight
+                    .sample(u[0])
+                    .map(|t| (t, flight.pdf(&flight.stop(t))))
+            },
+            |t| flight.pdf(&flight.stop(t)),
         );
         assert_conforms(
             &cells,
@@ -108,9 +112,9 @@ fn free_flights_follow_their_density_in_all_channels_at_once() {
             |u| {
                 flight
                     .sample_inside(u[0])
-                    .map(|t| (t, flight.pdf_inside(t)))
+                    .map(|t| (t, flight.pdf_inside(&flight.stop(t))))
             },
-            |t| flight.pdf_inside(t),
+            |t| flight.pdf_inside(&flight.stop(t)),
         );
     }
 }
@@ -142,9 +146,9 @@ fn distances_of_single_scattering_follow_their_density() {
         |[u, v]| {
             single
                 .sample(&world, v, u, [0.5, 0.5])
-                .map(|s| (s.t, s.pdf))
+                .map(|s| (s.stop.t, s.pdf))
         },
-        |t| single.pdf(&lights, 0, t),
+        |t| single.clone().density_at(&flight.stop(t)).of(&lights, 0),
     );
 }
 
