@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tyndall_render::layers::LayerSet;
 use tyndall_render::options::{Crop, Depth, Integrator};
+use tyndall_render::probe::Derivatives;
 use tyndall_scene::Fog;
 
 /// Clean images of fog, smoke and haze by volumetric radiance caching.
@@ -125,6 +126,9 @@ pub(crate) struct ProbeArgs {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) integrator: IntegratorArg,
+    /// Whether the gradients of a record know of moving silhouettes.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) derivatives: DerivativesArg,
     #[command(flatten)]
     pub(crate) source: SourceArgs,
     /// Print JSON.
@@ -192,6 +196,25 @@ impl ValueEnum for IntegratorArg {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.0.name()).help(self.0.about()))
+    }
+}
+
+/// [`Derivatives`] on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DerivativesArg {
+    /// what hides behind an edge appears and vanishes when the point moves
+    #[default]
+    Aware,
+    /// visibility is taken as constant, as in the papers of 2008
+    Blind,
+}
+
+impl From<DerivativesArg> for Derivatives {
+    fn from(arg: DerivativesArg) -> Self {
+        match arg {
+            DerivativesArg::Aware => Derivatives::Aware,
+            DerivativesArg::Blind => Derivatives::Blind,
+        }
     }
 }
 

@@ -28,6 +28,11 @@ impl SphericalFibonacci {
         }
     }
 
+    /// The rotation of the set as a whole.
+    pub fn rotation(&self) -> Quat {
+        self.rotation
+    }
+
     /// The directions, in order of the spiral.
     pub fn iter(self) -> impl ExactSizeIterator<Item = Vec3> {
         (0..self.n).map(move |i| self.direction(i))

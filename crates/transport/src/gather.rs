@@ -4,12 +4,14 @@
 //! scattering is computed where it is needed.
 
 use crate::lamp_directions::LampDirections;
+use crate::occlusion::{self, Seen};
 use crate::path::{FirstEvent, Source, Start, Vertex, Visitor, lamps_in_fog, trace};
 use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, World};
-use glam::Vec3;
-use std::f32::consts::PI;
-use tyndall_math::{Key, Ray, Sampler, warp};
+use glam::{Quat, Vec3};
+use std::f32::consts::{PI, TAU};
+use tyndall_math::spherical::SphericalVoronoi;
+use tyndall_math::{Key, Ray, Sampler, SphericalFibonacci, warp};
 use tyndall_media::MediumPoint;
 
 /// Batches over which standard errors are taken; each is a stratified set of its own. Parts of one set would not do: their
@@ -72,67 +74,175 @@ impl<'m> GatherDirections<'m> {
     /// The direction for two numbers in [0, 1).
     pub fn sample(&self, [u, v]: [f32; 2]) -> GatherDirection {
         let share = self.lamps.share();
-        let rest = (u - share) / (1.0 - share);
+        if u < share {
+            return self.weighted(self.lamps.sample([u, v]), share);
+        }
+        let rest = ((u - share) / (1.0 - share)).min(1.0 - f32::EPSILON);
         let w_i = match &self.lobe {
-            _ if u < share => self.lamps.sample([u, v]),
             None => warp::uniform_sphere([rest, v]),
+            Some((w_o, medium)) => medium.sample_phase(*w_o, [rest, v]).0,
+        };
+        self.weighted(w_i, share)
+    }
+
+    /// The direction that stands for the unit vector `d` of a pattern, where `share` of all directions are left to lamps.
+    fn along_pattern(&self, d: Vec3, share: f32) -> GatherDirection {
+        let w_i = match &self.lobe {
+            None => d,
             Some((w_o, medium)) => {
-                medium
-                    .sample_phase(*w_o, [rest.min(1.0 - f32::EPSILON), v])
-                    .0
+                let u = (0.5 - 0.5 * d.z).clamp(0.0, 1.0 - f32::EPSILON);
+                let v = (d.y.atan2(d.x) / TAU)
+                    .rem_euclid(1.0)
+                    .min(1.0 - f32::EPSILON);
+                medium.sample_phase(*w_o, [u, v]).0
             }
         };
+        self.weighted(w_i, share)
+    }
+
+    /// A direction around a lamp for two numbers in [0, 1), where `share` of all directions are.
+    fn around_lamp(&self, [u, v]: [f32; 2], share: f32) -> GatherDirection {
+        self.weighted(self.lamps.sample([u * self.lamps.share(), v]), share)
+    }
+
+    /// `w_i` with its weights where `share` of all directions are around lamps.
+    fn weighted(&self, w_i: Vec3, share: f32) -> GatherDirection {
         let uniform = 0.25 / PI;
-        let (phase, pdf) = match &self.lobe {
-            None => (Vec3::splat(uniform), uniform),
-            Some((w_o, medium)) => (medium.phase(*w_o, w_i).value, medium.phase_pdf(*w_o, w_i)),
+        let pdf = match &self.lobe {
+            None => uniform,
+            Some((w_o, medium)) => medium.phase_pdf(*w_o, w_i),
         };
-        let pdf = (1.0 - share) * pdf + self.lamps.pdf(w_i);
+        let around = if share > 0.0 {
+            share / self.lamps.share() * self.lamps.pdf(w_i)
+        } else {
+            0.0
+        };
+        let pdf = (1.0 - share) * pdf + around;
         GatherDirection {
             w_i,
-            weight: phase / pdf,
+            weight: self.phase(w_i) / pdf,
             uniform_weight: uniform / pdf,
+        }
+    }
+
+    /// The phase function for light from `w_i`, per colour channel and steradian.
+    fn phase(&self, w_i: Vec3) -> Vec3 {
+        match &self.lobe {
+            None => Vec3::splat(0.25 / PI),
+            Some((w_o, medium)) => medium.phase(*w_o, w_i).value,
         }
     }
 }
 
-/// Gathers multiple-scattered light at `x` from `n_rays` paths (at least one), weighting all directions alike.
+/// Whether gradients know that what is hidden changes when the point moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Derivatives {
+    /// Visibility moves with the silhouettes that the gather rays see.
+    #[default]
+    Aware,
+    /// Visibility is taken as constant.
+    Blind,
+}
+
+/// The directions of a gather, made once and turned at random for every batch of every record.
+///
+/// Spherical Fibonacci sets with their Voronoi cells: one for records to which no lamp is near, and some of fewer directions that
+/// leave up to half of the paths to directions around lamps.
+#[derive(Clone, Debug)]
+pub struct GatherPattern {
+    /// Paths of one batch.
+    paths: usize,
+    sets: [PatternSet; LAMP_LEVELS],
+}
+
+#[derive(Clone, Debug)]
+struct PatternSet {
+    directions: Vec<Vec3>,
+    cells: SphericalVoronoi,
+}
+
+/// Shares of lamp directions, at most a half, are rounded up to multiples of an eighth.
+const LAMP_LEVELS: usize = 5;
+
+impl GatherPattern {
+    /// For records of `n_rays` paths, rounded to a multiple of the number of batches (16), at least one each.
+    pub fn new(n_rays: usize) -> Self {
+        let paths = n_rays.div_ceil(BATCHES).max(1);
+        Self {
+            paths,
+            sets: std::array::from_fn(|eighths| {
+                let n = paths - Self::around_lamps(paths, eighths);
+                let directions: Vec<Vec3> =
+                    SphericalFibonacci::new(n as u32, [0.0; 3]).iter().collect();
+                PatternSet {
+                    cells: SphericalVoronoi::new(&directions),
+                    directions,
+                }
+            }),
+        }
+    }
+
+    /// Number of paths of a record.
+    pub fn n_rays(&self) -> usize {
+        self.paths * BATCHES
+    }
+
+    fn around_lamps(paths: usize, eighths: usize) -> usize {
+        paths * eighths / 8
+    }
+}
+
+/// Gathers multiple-scattered light at `x` along `pattern`, weighting all directions alike.
 ///
 /// `max_depth` counts the scattering at `x` itself.
 pub fn multiple<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
-    n_rays: usize,
+    pattern: &GatherPattern,
     max_depth: Option<u32>,
     key: Key,
 ) -> Gathered {
-    multiple_towards(world, x, None, n_rays, max_depth, key)
+    multiple_towards(world, x, None, pattern, Derivatives::Aware, max_depth, key)
 }
 
-/// As [`multiple`], with directions weighted by the phase function at `x` for light that leaves `towards` the eye.
+/// As [`multiple`], with directions weighted by the phase function at `x` for light that leaves `towards` the eye, and a choice of
+/// `derivatives`.
 ///
 /// Value and gradient are those of ∫ p L dω with p the media's phase functions mixed by scattering.
 pub fn multiple_towards<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
     towards: Option<Vec3>,
-    n_rays: usize,
+    pattern: &GatherPattern,
+    derivatives: Derivatives,
     max_depth: Option<u32>,
     key: Key,
 ) -> Gathered {
     let directions = GatherDirections::new(world, x, towards);
-    let sampler = |i: usize| Sampler::new(batch_key(key, i % BATCHES), (i / BATCHES) as u64);
-    let starts: Vec<(Start, GatherDirection)> = (0..n_rays)
-        .map(|i| {
-            let direction = directions.sample(sampler(i).next_2d());
-            let ray = Ray::new(x, direction.w_i);
-            let start = Start {
-                ray,
-                hit: Some(world.geometry.intersect(&ray, f32::INFINITY)),
-                first: FirstEvent::Any,
-                max_depth: max_depth.map(|d| d.saturating_sub(1)),
-            };
-            (start, direction)
+    let eighths = ((8.0 * directions.lamps.share()).ceil() as usize).min(LAMP_LEVELS - 1);
+    let set = &pattern.sets[eighths];
+    let share = GatherPattern::around_lamps(pattern.paths, eighths) as f32 / pattern.paths as f32;
+    let sampler = |batch: usize, i: usize| Sampler::new(batch_key(key, batch), i as u64);
+
+    let starts: Vec<(Start, GatherDirection)> = (0..BATCHES)
+        .flat_map(|batch| {
+            let turn = random_rotation(&mut sampler(batch, pattern.paths));
+            let directions = &directions;
+            (0..pattern.paths).map(move |i| {
+                let u = sampler(batch, i).next_2d();
+                let direction = match set.directions.get(i) {
+                    Some(&d) => directions.along_pattern((turn * d).normalize(), share),
+                    None => directions.around_lamp(u, share),
+                };
+                let ray = Ray::new(x, direction.w_i);
+                let start = Start {
+                    ray,
+                    hit: Some(world.geometry.intersect(&ray, f32::INFINITY)),
+                    first: FirstEvent::Any,
+                    max_depth: max_depth.map(|d| d.saturating_sub(1)),
+                };
+                (start, direction)
+            })
         })
         .collect();
     let distances = || {
@@ -144,20 +254,47 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     let nearest = distances().map(|(t, _)| t).fold(f32::INFINITY, f32::min);
     let inverse: f32 = distances().map(|(t, weight)| weight / t).sum();
     let radius = warp_radius(world, x, nearest);
+    let w_o = directions.lobe.as_ref().map(|(w_o, _)| *w_o);
+    // Without surfaces nothing hides anything.
+    let aware = derivatives == Derivatives::Aware && nearest.is_finite();
 
     let mut batches = Batches::default();
-    for (i, (start, direction)) in starts.iter().enumerate() {
-        let mut sampler = sampler(i);
-        let towards = directions.lobe.as_ref().map(|(w_o, _)| *w_o);
-        let mut visitor = WarpVisitor::new(world.media, x, radius, towards);
-        trace(world, start, &mut sampler, &mut visitor);
-        let weight = direction.weight;
-        let [dr, dg, db] = visitor.gradient;
-        batches.add(
-            i,
-            visitor.value * weight,
-            [dr * weight.x, dg * weight.y, db * weight.z],
-        );
+    let mut seen = Vec::with_capacity(pattern.paths);
+    for (batch, starts) in starts.chunks(pattern.paths).enumerate() {
+        seen.clear();
+        for (i, (start, direction)) in starts.iter().enumerate() {
+            let mut sampler = sampler(batch, i);
+            let mut visitor = WarpVisitor::new(world.media, x, radius, w_o);
+            trace(world, start, &mut sampler, &mut visitor);
+            let weight = direction.weight;
+            let [dr, dg, db] = visitor.gradient;
+            batches.add(
+                batch,
+                visitor.value * weight,
+                [dr * weight.x, dg * weight.y, db * weight.z],
+            );
+            if aware && i < set.directions.len() {
+                seen.push(Seen::new(
+                    direction.w_i,
+                    start.hit.flatten(),
+                    visitor.arrivals,
+                ));
+            }
+        }
+        if aware {
+            let turn = random_rotation(&mut sampler(batch, pattern.paths));
+            let phase = |w_i: Vec3| directions.phase(w_i);
+            let moved = match &directions.lobe {
+                None => occlusion::gradient(set.cells.borders(), turn, x, &seen, phase),
+                // Directions drawn by a phase function make cells of their own.
+                Some(_) => {
+                    let drawn: Vec<Vec3> = seen.iter().map(|s| s.direction).collect();
+                    let cells = SphericalVoronoi::new(&drawn);
+                    occlusion::gradient(cells.borders(), Quat::IDENTITY, x, &seen, phase)
+                }
+            };
+            batches.add_to_gradient(batch, moved);
+        }
     }
     let [value, dr, dg, db] = batches.means();
     let [value_error, er, eg, eb] = batches.errors();
@@ -167,8 +304,14 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
         value_error,
         gradient_error: [er, eg, eb],
         nearest,
-        harmonic_mean_distance: n_rays as f32 / inverse,
+        harmonic_mean_distance: starts.len() as f32 / inverse,
     }
+}
+
+/// A rotation even among all, for a batch whose first number of the next sample's set is free.
+fn random_rotation(sampler: &mut Sampler) -> Quat {
+    let [u, v] = sampler.next_2d();
+    SphericalFibonacci::new(1, [u, v, sampler.next_1d()]).rotation()
 }
 
 /// One path's estimate of (1/4π) ∫ L dω at `x`, light straight from emitters left out: what a record there would hold, unbiased
@@ -260,13 +403,20 @@ struct Batches {
 }
 
 impl Batches {
-    fn add(&mut self, i: usize, value: Vec3, gradient: [Vec3; 3]) {
-        let batch = &mut self.sums[i % BATCHES];
+    fn add(&mut self, batch: usize, value: Vec3, gradient: [Vec3; 3]) {
         let [dr, dg, db] = gradient;
-        for (sum, term) in batch.iter_mut().zip([value, dr, dg, db]) {
+        for (sum, term) in self.sums[batch].iter_mut().zip([value, dr, dg, db]) {
             *sum += term.as_dvec3();
         }
-        self.counts[i % BATCHES] += 1;
+        self.counts[batch] += 1;
+    }
+
+    /// Adds to the mean gradient of a batch that is complete.
+    fn add_to_gradient(&mut self, batch: usize, gradient: [Vec3; 3]) {
+        let n = self.counts[batch] as f64;
+        for (sum, term) in self.sums[batch][1..].iter_mut().zip(gradient) {
+            *sum += term.as_dvec3() * n;
+        }
     }
 
     fn means(&self) -> [Vec3; 4] {

@@ -55,7 +55,7 @@
 //! let fog = Medium::new(MediumParams::new(Vec3::ONE, Vec3::splat(0.8)))?;
 //! let world = World { geometry: &Empty, lights: &Lamp, media: &Media::new(vec![fog]) };
 //! let key = Key { seed: 1, purpose: Purpose::Probe, index: 0 };
-//! let found = gather::multiple(&world, Vec3::X, 4096, None, key);
+//! let found = gather::multiple(&world, Vec3::X, &gather::GatherPattern::new(4096), None, key);
 //! assert!((found.value.x / 0.07814 - 1.0).abs() < 0.05, "{found:?}");
 //! // It falls with distance, here by 0.133 a metre.
 //! assert!((found.gradient[0].x / -0.1328 - 1.0).abs() < 0.15, "{found:?}");
@@ -81,6 +81,7 @@ pub mod gather;
 pub mod lamp_directions;
 pub mod layers;
 pub mod light_choice;
+mod occlusion;
 pub mod path;
 pub mod single;
 mod warp_translation;

@@ -18,6 +18,7 @@
 
 use crate::path::{Source, Vertex, Visitor};
 use glam::Vec3;
+use smallvec::SmallVec;
 use tyndall_math::Ray;
 use tyndall_media::Media;
 
@@ -50,12 +51,18 @@ pub(crate) struct WarpVisitor<'m> {
     leaving: Option<Leaving>,
     /// Whether any medium scatters otherwise than isotropically.
     lobes: bool,
-    started: bool,
+    /// Distance of the first vertex.
+    first: Option<f32>,
     /// ∂ ln f of the path so far, per colour channel.
     log_gradient: [Vec3; 3],
     pub(crate) value: Vec3,
     pub(crate) gradient: [Vec3; 3],
+    /// Distances along the first stretch from which light arrives, and how much from each.
+    pub(crate) arrivals: Arrivals,
 }
+
+/// Distance in metres and radiance: what a path met first, and what was scattered into it on the way there.
+pub(crate) type Arrivals = SmallVec<[(f32, Vec3); 3]>;
 
 impl<'m> WarpVisitor<'m> {
     /// For paths that start at `center`; `radius` is the D of the displacement field. The light leaves in the direction
@@ -72,10 +79,19 @@ impl<'m> WarpVisitor<'m> {
             },
             leaving: towards.map(|w_o| Leaving { w_o, rate: 0.0 }),
             lobes: !media.is_isotropic(),
-            started: false,
+            first: None,
             log_gradient: [Vec3::ZERO; 3],
             value: Vec3::ZERO,
             gradient: [Vec3::ZERO; 3],
+            arrivals: SmallVec::new(),
+        }
+    }
+
+    /// Notes light that set out at `distance` along the first stretch.
+    fn arrive(&mut self, distance: f32, value: Vec3) {
+        match self.arrivals.last_mut() {
+            Some((at, sum)) if *at == distance => *sum += value,
+            _ => self.arrivals.push((distance, value)),
         }
     }
 
@@ -207,11 +223,11 @@ impl Visitor for WarpVisitor<'_> {
         self.leaving = self.turn_towards(&mut log_gradient, (self.last, self.leaving), end);
         self.last = end;
         self.log_gradient = log_gradient;
-        self.started = true;
+        self.first.get_or_insert(end.position.distance(self.center));
     }
 
     fn light(&mut self, value: Vec3, last: Option<Vertex<'_, '_>>, source: Source) {
-        if !self.started && last.is_none() {
+        if self.first.is_none() && last.is_none() {
             // Straight from an emitter: single scattering at the gather point, not ours.
             return;
         }
@@ -246,6 +262,10 @@ impl Visitor for WarpVisitor<'_> {
                 }
             }
         }
+        let set_out = self
+            .first
+            .unwrap_or_else(|| from.position.distance(self.center));
+        self.arrive(set_out, value);
         self.value += value;
         for c in 0..3 {
             self.gradient[c] += log_gradient[c] * value[c];

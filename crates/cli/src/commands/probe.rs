@@ -11,6 +11,7 @@ pub(super) fn run(args: &ProbeArgs) -> Result<(), CliError> {
         towards: args.dir.map(Into::into),
         samples: args.samples,
         integrator: args.integrator.0,
+        derivatives: args.derivatives.into(),
         seed: 0,
     };
     let scene = tyndall_scene::load(&args.scene, &args.source.load_options())?;

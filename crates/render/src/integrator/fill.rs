@@ -13,7 +13,7 @@ use tyndall_cache::{Cache, Record};
 use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
 use tyndall_scene::Scene;
 use tyndall_transport::free_flight::FreeFlight;
-use tyndall_transport::gather;
+use tyndall_transport::gather::{self, GatherPattern};
 use tyndall_transport::world::{Geometry, Lights, World};
 
 /// Camera rays along the longer side of the frame on the first level; each level doubles them, at most to one per pixel.
@@ -55,8 +55,15 @@ pub(crate) struct Fill<'s> {
     pub(crate) seed: u64,
     /// Target error of the image.
     pub(crate) error: f32,
+    /// Directions gathered for a record.
+    pub(crate) pattern: GatherPattern,
     /// When to stop with what there is.
     pub(crate) deadline: Option<Instant>,
+}
+
+/// Directions of a record: noise falls with the error asked for, and about eight records blend at a point.
+pub(crate) fn pattern(error: f32) -> GatherPattern {
+    GatherPattern::new(((RAYS_GAIN / error).powi(2) as usize).clamp(128, 4096))
 }
 
 /// A filled cache.
@@ -155,11 +162,6 @@ impl Fill<'_> {
 
     fn out_of_time(&self) -> bool {
         self.deadline.is_some_and(|d| Instant::now() >= d)
-    }
-
-    /// Directions gathered for a record: noise falls with the error asked for, and about eight records blend at a point.
-    fn rays_per_record(&self) -> usize {
-        ((RAYS_GAIN / self.error).powi(2) as usize).clamp(128, 4096)
     }
 
     /// Mean length over which camera rays see into the media, in metres.
@@ -263,7 +265,7 @@ impl Fill<'_> {
             index,
         };
         let x = clear_of_surfaces(&world, point.position, CLEARANCE * scale, key);
-        let g = gather::multiple(&world, x, self.rays_per_record(), self.max_depth, key);
+        let g = gather::multiple(&world, x, &self.pattern, self.max_depth, key);
         // Lengths over which the field changes: to surfaces, to lamps, to the edge of a medium (where the field falls off
         // ever faster) unless it lies behind a surface, a free path, and its own relative gradient. Surfaces count half: they
         // are near on one side, and light does not end there. Edges count more: at half, the furnace was 0.25 % too bright.

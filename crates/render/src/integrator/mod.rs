@@ -256,6 +256,7 @@ impl<'s> Run<'s> {
             max_depth: self.max_depth,
             seed: self.options.seed,
             error: self.error,
+            pattern: fill::pattern(self.error),
             deadline: self.deadline(FILL_DEADLINE),
         };
         fill.run(self.progress)

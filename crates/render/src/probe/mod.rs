@@ -8,6 +8,7 @@ mod single;
 
 pub use paths::by_paths;
 pub use single::single;
+pub use tyndall_transport::gather::Derivatives;
 
 use crate::options::Integrator;
 use glam::Vec3;
@@ -15,7 +16,8 @@ use serde::Serialize;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose};
 use tyndall_scene::Scene;
-use tyndall_transport::{Lights, gather};
+use tyndall_transport::Lights;
+use tyndall_transport::gather::{self, GatherPattern};
 
 /// What to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +30,8 @@ pub struct ProbeOptions {
     pub samples: u32,
     /// How multiple scattering is found.
     pub integrator: Integrator,
+    /// Whether gradients of a record know of moving silhouettes.
+    pub derivatives: Derivatives,
     /// Seed of the random numbers.
     pub seed: u64,
 }
@@ -129,7 +133,15 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
     let (single, multiple) = match options.integrator {
         Integrator::Path => by_paths(&world, options.at, towards, samples, max_depth, key),
         Integrator::Cache => {
-            let g = gather::multiple_towards(&world, options.at, towards, samples, max_depth, key);
+            let g = gather::multiple_towards(
+                &world,
+                options.at,
+                towards,
+                &GatherPattern::new(samples),
+                options.derivatives,
+                max_depth,
+                key,
+            );
             let multiple = Part {
                 value: g.value.to_array(),
                 stderr: g.value_error.to_array(),

@@ -26,6 +26,7 @@ fn options(integrator: Integrator, samples: u32) -> ProbeOptions {
         towards: Some(Vec3::new(0.2, 0.3, -0.9)),
         samples,
         integrator,
+        derivatives: Derivatives::Aware,
         seed: 7,
     }
 }

@@ -8,7 +8,7 @@ use crate::probe;
 use glam::Vec3;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Ray, Sampler};
-use tyndall_transport::gather;
+use tyndall_transport::gather::{self, Derivatives, GatherPattern};
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Start, trace};
 
@@ -204,7 +204,16 @@ fn measure(world: &World<'_>, key: Key, rays: usize, point: &Point) -> (f64, [f6
         }
     };
     if point.light != Light::Single {
-        let g = gather::multiple_towards(world, point.x, point.towards, rays, None, key);
+        let pattern = GatherPattern::new(rays);
+        let g = gather::multiple_towards(
+            world,
+            point.x,
+            point.towards,
+            &pattern,
+            Derivatives::Aware,
+            None,
+            key,
+        );
         add(g.value, g.gradient);
     }
     if point.light != Light::Multiple {
