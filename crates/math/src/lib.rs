@@ -8,8 +8,8 @@
 //! * [`sh::Basis`]: spherical harmonics to any order, with [`sh::convolve_zonal`] for scattering.
 //!
 //! Around them: [`warp`] (directions, disks, free paths), [`spherical`] (lamps sampled by solid angle), [`distribution`] and
-//! [`alias`] (tables), [`low_discrepancy`], [`quadrature`], [`stats`], and [`testing`], the χ² test that every sampler of the
-//! workspace must pass.
+//! [`alias`] (tables), [`low_discrepancy`], [`quadrature`], [`jet`] (formulas that carry their second derivatives),
+//! [`stats`], and [`testing`], the χ² test that every sampler of the workspace must pass.
 //!
 //! # Example
 //!
@@ -45,6 +45,7 @@ pub mod alias;
 pub mod distribution;
 pub mod exponential;
 pub mod frame;
+pub mod jet;
 pub mod low_discrepancy;
 pub mod offset;
 pub mod quadrature;
@@ -61,6 +62,7 @@ pub use alias::AliasTable;
 pub use distribution::{Distribution1D, Distribution2D};
 pub use exponential::{one_minus_exp_over_x, one_minus_exp_over_x_derivative};
 pub use frame::Frame;
+pub use jet::{Jet, JetVec3};
 pub use low_discrepancy::SphericalFibonacci;
 pub use offset::offset_origin;
 pub use ray::Ray;
