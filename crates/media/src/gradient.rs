@@ -23,11 +23,11 @@ pub struct EndGradients {
 ///
 /// A ray that grazes a boundary leaves it arbitrarily far away when tilted; the true gradient grows like 1/cosine (at a
 /// ball) or jumps (at a box). Clamped, a gradient stays under 10³ times the extinction there.
-const GRAZING: f64 = 1e-3;
+pub(crate) const GRAZING: f64 = 1e-3;
 
 /// Columns above this have no gradient, in metres: ten thousand light years of fog let no light through, and their
 /// gradient might not fit into an f32.
-const OPAQUE: f64 = 1e20;
+pub(crate) const OPAQUE: f64 = 1e20;
 
 /// One medium's column along a segment, and what its derivatives are made of.
 ///

@@ -8,7 +8,8 @@
 //!   direction there;
 //! * [`Media::segment`] gives a [`Segment`]: optical depth as a function of distance along a ray, and its inverse, the
 //!   distance at which a given optical depth is reached; [`Media::optical_depth`] is the short way for a shadow ray;
-//! * [`Media::optical_depth_gradient`] says how optical depth changes when either end of a segment moves.
+//! * [`Media::optical_depth_gradient`] says how optical depth changes when either end of a segment moves, and
+//!   [`Media::optical_depth_jet`] how that gradient changes.
 //!
 //! ```
 //! use glam::Vec3;
@@ -47,6 +48,7 @@
 
 mod density;
 mod gradient;
+mod hessian;
 mod line;
 mod media;
 mod medium;

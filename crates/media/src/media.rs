@@ -3,11 +3,12 @@
 //! Media overlap freely and add up. Vacuum (no extinction, no emission) is kept in the list and costs nothing else.
 
 use crate::gradient::{self, EndGradients};
+use crate::hessian;
 use crate::line::Line;
 use crate::segment::Piece;
 use crate::{Medium, MediumPoint, Segment};
-use glam::Vec3;
-use tyndall_math::{Aabb, Ray};
+use glam::{DVec3, Vec3};
+use tyndall_math::{Aabb, Jet, Ray};
 
 /// The media of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,6 +76,29 @@ impl Media {
     /// Where a medium's column is infinite (or above 10²⁰ m), its share of the gradient is zero: transmittance is and stays 0.
     pub fn optical_depth_gradient_rigid(&self, ray: &Ray, t_max: f32) -> (Vec3, [Vec3; 3]) {
         gradient::of_translation(&self.list, &ray.into(), t_max.into())
+    }
+
+    /// Optical depth between `fixed` and `moving` for each channel, with gradient and Hessian when `moving` moves.
+    ///
+    /// Exact and in f64, for formulas that go on with [`Jet`]s. Zero where the points coincide to f32; elsewhere as
+    /// [`Media::optical_depth_gradient`], and constant where a column is infinite or above 10²⁰ m. The Hessian has the
+    /// motion and the curvature of region boundaries and the kink of a height fog at its base; where the line grazes
+    /// those within a milliradian, it is bounded instead of exact.
+    pub fn optical_depth_jet(&self, fixed: DVec3, moving: DVec3) -> [Jet; 3] {
+        hessian::of_end(&self.list, fixed, moving)
+    }
+
+    /// Optical depth from `origin` along the unit vector `direction` over `length`, which may be infinite, for each
+    /// channel, with gradient and Hessian when the origin moves while direction and length stay.
+    ///
+    /// Exact and finite as [`Media::optical_depth_jet`]; only the depth itself may be infinite.
+    pub fn optical_depth_jet_rigid(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        length: f64,
+    ) -> [Jet; 3] {
+        hessian::of_translation(&self.list, Line { origin, direction }, length)
     }
 
     /// Whether all scattering is isotropic.

@@ -108,6 +108,14 @@ impl Region {
             Self::Sphere { center, .. } => (p - center.as_dvec3()).normalize_or_zero(),
         }
     }
+
+    /// How fast the outward normal turns along the boundary, in radians per metre: 1/radius, 0 where it is flat.
+    pub(crate) fn curvature(&self) -> f64 {
+        match *self {
+            Self::Everywhere | Self::Box { .. } => 0.0,
+            Self::Sphere { radius, .. } => 1.0 / f64::from(radius),
+        }
+    }
 }
 
 /// Kay and Kajiya 1986 (slabs), with directions parallel to a slab decided by the origin instead of by 0/0.

@@ -3,6 +3,7 @@
 //! In scale heights above the base a ray climbs as s(t) = s₀ + k t, so the density exp(−max(0, s)) is elementary on either
 //! side of the base. Every form below is written from its thinner or its denser end so that nothing overflows or cancels.
 
+use crate::gradient::GRAZING;
 use crate::line::Line;
 
 /// exp(−max(0, s₀ + k t)).
@@ -38,6 +39,15 @@ impl HeightProfile {
 
     pub(crate) fn value(&self, t: f64) -> f64 {
         (-self.height(t).max(0.0)).exp()
+    }
+
+    /// ∂ρ/∂y at `t`: −ρ/H above the base, 0 below and on it.
+    pub(crate) fn vertical_gradient(&self, t: f64) -> f64 {
+        if self.height(t) > 0.0 {
+            -self.value(t) * self.inverse_scale_height
+        } else {
+            0.0
+        }
     }
 
     /// The parts of [`t0`, `t1`] below and above the base; an absent part has its end at or before its start.
@@ -116,16 +126,45 @@ impl HeightProfile {
         if zeroth == 0.0 {
             return [0.0; 2];
         }
-        let (a, b) = above;
-        let l = b - a;
-        let k = self.slope.abs();
-        // Distances are measured from the denser end, in whose density the remainder ∫ v ρ dv is written.
-        let first = if self.slope < 0.0 {
-            b * zeroth - self.value(b) * first_moment(k, l)
+        let (end, first) = self.moment_from_denser_end(above);
+        [zeroth, end * zeroth + first].map(|m| -m * self.inverse_scale_height)
+    }
+
+    /// ∫ tʲ ∂²ρ/∂y² dt for j = 0, 1, 2, with ∂²ρ/∂y² = ρ/H² above the base and 0 below.
+    ///
+    /// On the base ∂ρ/∂y falls by 1/H, which adds −tʲ/(H |∂y/∂t|) where the ray crosses it; the slope ∂y/∂t is kept above
+    /// [`GRAZING`].
+    pub(crate) fn hessian_moments(&self, t0: f64, t1: f64) -> [f64; 3] {
+        let [below, above] = self.split(t0, t1);
+        let zeroth = self.column_above(above);
+        if zeroth == 0.0 {
+            return [0.0; 3];
+        }
+        let (end, first) = self.moment_from_denser_end(above);
+        let second = self.value(end) * moment(2, self.slope.abs(), length(above));
+        let mut moments = [
+            zeroth,
+            end * zeroth + first,
+            end * (end * zeroth + 2.0 * first) + second,
+        ];
+        if length(below) > 0.0 {
+            let kink = 1.0 / self.slope.abs().max(GRAZING * self.inverse_scale_height);
+            moments[0] -= kink;
+            moments[1] -= kink * end;
+            moments[2] -= kink * end * end;
+        }
+        moments.map(|m| m * self.inverse_scale_height * self.inverse_scale_height)
+    }
+
+    /// The denser end e of a part above the base, and ∫ (t − e) ρ dt over the part.
+    fn moment_from_denser_end(&self, (a, b): (f64, f64)) -> (f64, f64) {
+        let (end, sign) = if self.slope < 0.0 {
+            (b, -1.0)
         } else {
-            a * zeroth + self.value(a) * first_moment(k, l)
+            (a, 1.0)
         };
-        [zeroth, first].map(|m| -m * self.inverse_scale_height)
+        let moment = self.value(end) * moment(1, self.slope.abs(), b - a);
+        (end, sign * moment)
     }
 }
 
@@ -158,18 +197,60 @@ fn descend(s: f64, k: f64, column: f64) -> f64 {
     }
 }
 
-/// ∫₀^l v e^(−k v) dv = (1 − e^(−w)(1 + w))/k², w = k l.
-fn first_moment(k: f64, l: f64) -> f64 {
+/// ∫₀^l vʲ e^(−k v) dv for j = 1, 2, the incomplete gamma function γ(j + 1, w)/kʲ⁺¹ with w = k l.
+///
+/// The series lʲ⁺¹ e^(−w) Σ wⁿ/((j + 1) … (j + 1 + n)), whose terms are all positive (Abramowitz and Stegun 6.5.29), for
+/// small w; the closed form (j! − e^(−w) Σ wⁱ j!/i!)/kʲ⁺¹ from w = ½ on, where it cancels two digits at most.
+fn moment(j: i32, k: f64, l: f64) -> f64 {
     let w = k * l;
-    if w < 1e-2 {
-        // Series Σ (−w)ⁿ/(n! (n + 2)); the first term left out is w⁵/840, under 1e-12.
-        return l * l * (0.5 - w * (1.0 / 3.0 - w * (1.0 / 8.0 - w * (1.0 / 30.0 - w / 144.0))));
+    if w < 0.5 {
+        let mut n = f64::from(j + 1);
+        let mut term = 1.0 / n;
+        let mut sum = term;
+        while term > sum * f64::EPSILON {
+            n += 1.0;
+            term *= w / n;
+            sum += term;
+        }
+        return l.powi(j + 1) * (-w).exp() * sum;
     }
-    // (1 + w) e^(−w) is 0 in f64 from w = 752 on, and NaN for infinite w.
+    let (factorial, polynomial) = if j == 1 {
+        (1.0, 1.0 + w)
+    } else {
+        (2.0, 2.0 + w * (2.0 + w))
+    };
+    // The rest is 0 in f64 from w = 760 on, and NaN for infinite w.
     let rest = if w < 800.0 {
-        (-w).exp() * (1.0 + w)
+        (-w).exp() * polynomial
     } else {
         0.0
     };
-    (1.0 - rest) / (k * k)
+    (factorial - rest) / k.powi(j + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tyndall_math::quadrature::gauss_legendre;
+
+    #[test]
+    fn moments_of_an_exponential_are_those_of_a_fine_quadrature() {
+        let rule = gauss_legendre(64);
+        for k in [0.0, 1e-9, 1e-3, 0.03, 0.166, 0.167, 0.5, 2.0, 9.0] {
+            for j in [1, 2] {
+                let l = 3.0;
+                let integrand = |v: f64| v.powi(j) * (-k * v).exp();
+                let integral: f64 = rule
+                    .iter()
+                    .map(|(x, weight)| 0.5 * l * weight * integrand(0.5 * l * (1.0 + x)))
+                    .sum();
+                // Rounding, and two digits cancelled.
+                assert!(
+                    (moment(j, k, l) / integral - 1.0).abs() < 2e-14,
+                    "j = {j}, k = {k}"
+                );
+            }
+        }
+        assert_eq!(moment(2, 0.5, f64::INFINITY), 16.0);
+    }
 }

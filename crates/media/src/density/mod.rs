@@ -1,7 +1,7 @@
 //! How much medium there is at a point: a dimensionless factor on all coefficients of a medium.
 //!
 //! A new kind of density (a grid, say) is a variant of [`Density`] and its restriction to a ray, a variant of [`Profile`]:
-//! value, column, inverse column and moments of the gradient. All else follows.
+//! value, column, inverse column and moments of the derivatives. All else follows.
 
 mod height;
 
@@ -127,6 +127,22 @@ impl Profile {
         match self {
             Self::Constant(_) => [DVec3::ZERO; 2],
             Self::Height(height) => height.gradient_moments(t0, t1).map(|m| DVec3::Y * m),
+        }
+    }
+
+    /// ∂density/∂y at distance `t`; no density varies sideways.
+    pub(crate) fn vertical_gradient(&self, t: f64) -> f64 {
+        match self {
+            Self::Constant(_) => 0.0,
+            Self::Height(height) => height.vertical_gradient(t),
+        }
+    }
+
+    /// ∫ tʲ ∂²density/∂y² dt from `t0` to `t1` for j = 0, 1, 2; for infinite `t1` as [`Profile::gradient_moments`].
+    pub(crate) fn hessian_moments(&self, t0: f64, t1: f64) -> [f64; 3] {
+        match self {
+            Self::Constant(_) => [0.0; 3],
+            Self::Height(height) => height.hessian_moments(t0, t1),
         }
     }
 }
