@@ -11,6 +11,8 @@
 //! * [`Media::optical_depth_gradient`] says how optical depth changes when either end of a segment moves, and
 //!   [`Media::optical_depth_jet`] how that gradient changes.
 //!
+//! Extinction of any other kind is an [`ExtinctionField`], and [`march`] integrates it with the same derivatives.
+//!
 //! ```
 //! use glam::Vec3;
 //! use tyndall_math::Ray;
@@ -50,6 +52,7 @@ mod density;
 mod gradient;
 mod hessian;
 mod line;
+pub mod march;
 mod media;
 mod medium;
 pub mod phase;
@@ -59,6 +62,7 @@ mod segment;
 
 pub use density::Density;
 pub use gradient::EndGradients;
+pub use march::{ExtinctionField, MovingSegment, SmoothExtinctionField};
 pub use media::Media;
 pub use medium::{MAX_SIGMA_T, MIN_SCALE_HEIGHT, Medium, MediumError, MediumParams};
 pub use phase::{Asymmetry, AsymmetryError, HenyeyGreenstein, PhaseFunction};
