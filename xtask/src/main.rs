@@ -1,4 +1,5 @@
-//! Development commands of Tyndall: `cargo xtask assets|render-all|golden|test`. Plain cargo and nothing else is needed.
+//! Development commands of Tyndall: `cargo xtask assets|render-all|golden|report|test`. Plain cargo and nothing else is
+//! needed.
 
 #![allow(clippy::print_stdout, reason = "a command line program")]
 
@@ -6,6 +7,7 @@ mod assets;
 mod cargo;
 mod golden;
 mod render_all;
+mod report;
 mod test;
 
 use anyhow::Result;
@@ -26,6 +28,8 @@ enum Command {
     RenderAll(render_all::Options),
     /// Compare small renders with the golden images in `tests/golden`
     Golden(golden::Options),
+    /// Compute a figure with its numbers and write both into `out/report/`
+    Report(report::Options),
     /// Run all that CI runs, stopping at the first failure
     Test,
 }
@@ -35,6 +39,7 @@ fn main() -> Result<()> {
         Command::Assets => assets::run(),
         Command::RenderAll(options) => render_all::run(&options),
         Command::Golden(options) => golden::run(&options),
+        Command::Report(options) => report::run(&options),
         Command::Test => test::run(),
     }
 }
