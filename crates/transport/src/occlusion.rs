@@ -1,15 +1,20 @@
 //! How light that is gathered at a point changes because silhouettes move when the point does.
 //!
 //! Each gather ray stands for its Voronoi cell of directions. Along the border of two cells the nearer surface hides what the farther
-//! ray sees beyond it, and when the point moves that border shifts by the inverse of its depth.
+//! ray sees beyond it, and when the point moves that border shifts by one over its depth.
 
 use crate::warp_translation::Arrivals;
 use crate::world::SurfaceHit;
 use glam::{Quat, Vec3};
 use tyndall_math::spherical::{Border, edge};
 
-/// How far the plane of a hit is followed to a border, as a factor on its distance.
-const FOLLOWED: f32 = 2.0;
+/// Two planes count as one where they lie closer than this, relative to their distance.
+const COPLANAR: f32 = 1e-3;
+/// A small piece of surface hides what is farther than it by this factor, where the pieces that it may continue in are not known.
+const APART: f32 = 1.5;
+
+/// Just short of a surface.
+const BARELY: f32 = 1.0 - 1e-5;
 
 /// What a gather ray saw.
 #[derive(Clone, Debug)]
@@ -18,6 +23,12 @@ pub(crate) struct Seen {
     pub(crate) direction: Vec3,
     hit: Option<SurfaceHit>,
     arrivals: Arrivals,
+}
+
+/// A silhouette between two rays: which of them it hides something from, and one over its distance.
+struct Silhouette<'s> {
+    far: &'s Seen,
+    inverse_depth: f32,
 }
 
 impl Seen {
@@ -29,32 +40,56 @@ impl Seen {
         }
     }
 
-    /// Distance at which the plane that the ray met is seen from `x` in direction `w`; infinite where nothing was met.
+    /// Σ v (1/r − 1/t): light per metre of sideways motion that is hidden by a surface at r, over what arrives from t beyond.
     ///
-    /// Where neighbours see one plane, or two that meet, they agree on the depth of their border, and nothing is hidden there.
-    fn depth(&self, x: Vec3, w: Vec3) -> f32 {
-        let Some(hit) = &self.hit else {
-            return f32::INFINITY;
-        };
-        let along = (hit.position - x).dot(hit.normal) / w.dot(hit.normal);
-        if along > 0.0 {
-            along.clamp(hit.t / FOLLOWED, hit.t * FOLLOWED)
-        } else {
-            hit.t * FOLLOWED
-        }
-    }
-
-    /// Light that a surface at `depth` would hide in a direction where this ray's own surface is seen at `own_depth`, less what
-    /// is hidden only because the hidden points do not move: Σ v κ over what arrives from t > depth, κ = 1 − depth/t.
-    fn hidden(&self, depth: f32, own_depth: f32) -> Vec3 {
-        let stretch = match &self.hit {
-            Some(hit) => own_depth / hit.t,
-            None => 1.0,
-        };
+    /// What the ray's own surface sends counts even where 1/r lies below 1/t: the direction in which the depth r is taken errs to
+    /// either side of the silhouette, and the sum is right on average because it is linear in 1/r.
+    fn hidden(&self, inverse_depth: f32) -> Vec3 {
+        let surface = self
+            .hit
+            .as_ref()
+            .map_or(f32::INFINITY, |hit| hit.t * BARELY);
         self.arrivals
             .iter()
-            .map(|&(t, value)| value * (1.0 - depth / (t * stretch)).max(0.0))
+            .filter(|&&(t, _)| t >= surface || t * inverse_depth > 1.0)
+            .map(|&(t, value)| value * (inverse_depth - 1.0 / t))
             .sum()
+    }
+}
+
+/// One over the distance at which the plane of `hit` is seen from `x` in direction `w`: linear in `w`, not positive where it is not seen.
+fn inverse_depth(hit: &SurfaceHit, x: Vec3, w: Vec3) -> f32 {
+    w.dot(hit.normal) / (hit.position - x).dot(hit.normal)
+}
+
+/// Whether the surface that `near` met ends before `far`, as seen from `x`; `w` is the direction of their border.
+///
+/// Where a plane, followed to the direction of the other ray, lies in front of what that ray met, its surface has ended on the way. Where
+/// each plane lies behind the other's hit they meet in a corner that opens towards `x`, where each lies in front in a ridge: nothing is
+/// hidden at either. Pieces of surface smaller than the way to such a corner are taken to end where they are much nearer.
+fn silhouette<'s>(x: Vec3, w: Vec3, near: &'s Seen, far: &'s Seen) -> Option<Silhouette<'s>> {
+    let here = near.hit.as_ref()?;
+    let followed = inverse_depth(here, x, far.direction);
+    let found = Some(Silhouette {
+        far,
+        inverse_depth: inverse_depth(here, x, w),
+    });
+    let Some(there) = &far.hit else {
+        return found;
+    };
+    let in_front =
+        |a: &SurfaceHit, w: Vec3, b: &SurfaceHit| inverse_depth(a, x, w) * b.t > 1.0 + COPLANAR;
+    match (
+        in_front(here, far.direction, there),
+        in_front(there, near.direction, here),
+    ) {
+        (true, false) => found,
+        (false, false) if here.t * APART < there.t => {
+            let ends = followed <= 0.0
+                || (x + far.direction / followed).distance(here.position) > here.size;
+            found.filter(|_| ends)
+        }
+        _ => None,
     }
 }
 
@@ -80,24 +115,23 @@ pub(crate) fn gradient(
     let mut sum = [Vec3::ZERO; 3];
     for Border { cells, ends } in borders {
         let [i, j] = cells.map(|c| &seen[c as usize]);
-        if i.hit.is_none() && j.hit.is_none() {
-            continue;
-        }
         let ends = ends.map(|end| turn * end);
         let Some(w) = (ends[0] + ends[1]).try_normalize() else {
             continue;
         };
-        let [depth_i, depth_j] = [i, j].map(|s| s.depth(x, w));
-        let (near, far, far_depth, side) = if depth_i < depth_j {
-            (depth_i, j, depth_j, -1.0)
-        } else {
-            (depth_j, i, depth_i, 1.0)
+        let (found, side) = match silhouette(x, w, i, j) {
+            Some(found) => (found, -1.0),
+            None => match silhouette(x, w, j, i) {
+                Some(found) => (found, 1.0),
+                None => continue,
+            },
         };
-        let hidden = far.hidden(near, far_depth);
+        let hidden = found.far.hidden(found.inverse_depth);
         if hidden == Vec3::ZERO {
             continue;
         }
-        let [a, b] = ends.map(|end| (end * near).as_dvec3());
+        // The field of an edge falls as one over its scale.
+        let [a, b] = ends.map(|end| end.as_dvec3());
         let motion = edge(a, b).as_vec3() * side;
         let change = hidden * phase(w);
         for (c, sum) in sum.iter_mut().enumerate() {
