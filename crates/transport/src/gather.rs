@@ -10,8 +10,9 @@ use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, World};
 use glam::{Quat, Vec3};
 use std::f32::consts::{PI, TAU};
+use std::sync::OnceLock;
 use tyndall_math::spherical::SphericalVoronoi;
-use tyndall_math::{Key, Ray, Sampler, SphericalFibonacci, warp};
+use tyndall_math::{Key, Purpose, Ray, Sampler, SphericalFibonacci, warp};
 use tyndall_media::MediumPoint;
 
 /// Batches over which standard errors are taken; each is a stratified set of its own. Parts of one set would not do: their
@@ -144,18 +145,22 @@ pub enum Derivatives {
     Blind,
 }
 
-/// The directions of a gather, made once and turned at random for every batch of every record.
+/// The directions of a gather, made once and turned at random for every record.
 ///
-/// Spherical Fibonacci sets with their Voronoi cells: one for records to which no lamp is near, and some of fewer directions that
-/// leave up to half of the paths to directions around lamps.
-#[derive(Clone, Debug)]
+/// Each batch is a spherical Fibonacci set. Batches stand turned against each other by fixed random rotations, and groups of them share
+/// one Voronoi diagram, fine enough for silhouettes. There is one such pattern for records to which no lamp is near, and some of fewer
+/// directions that leave up to half of the paths to directions around lamps.
+#[derive(Debug)]
 pub struct GatherPattern {
     /// Paths of one batch.
     paths: usize,
-    sets: [PatternSet; LAMP_LEVELS],
+    /// Batches of a group.
+    group: usize,
+    sets: [OnceLock<PatternSet>; LAMP_LEVELS],
 }
 
-#[derive(Clone, Debug)]
+/// Directions of one group, batch by batch, and the cells that all of them make.
+#[derive(Debug)]
 struct PatternSet {
     directions: Vec<Vec3>,
     cells: SphericalVoronoi,
@@ -163,22 +168,22 @@ struct PatternSet {
 
 /// Shares of lamp directions, at most a half, are rounded up to multiples of an eighth.
 const LAMP_LEVELS: usize = 5;
+/// Most directions of one diagram: finer cells would gain nothing and take memory.
+const DIAGRAM: usize = 1 << 16;
 
 impl GatherPattern {
     /// For records of `n_rays` paths, rounded to a multiple of the number of batches (16), at least one each.
     pub fn new(n_rays: usize) -> Self {
         let paths = n_rays.div_ceil(BATCHES).max(1);
+        // A power of two, so that groups are equal.
+        let group = (1..=BATCHES)
+            .rev()
+            .find(|g| g.is_power_of_two() && g * paths <= DIAGRAM)
+            .unwrap_or(1);
         Self {
             paths,
-            sets: std::array::from_fn(|eighths| {
-                let n = paths - Self::around_lamps(paths, eighths);
-                let directions: Vec<Vec3> =
-                    SphericalFibonacci::new(n as u32, [0.0; 3]).iter().collect();
-                PatternSet {
-                    cells: SphericalVoronoi::new(&directions),
-                    directions,
-                }
-            }),
+            group,
+            sets: Default::default(),
         }
     }
 
@@ -187,10 +192,34 @@ impl GatherPattern {
         self.paths * BATCHES
     }
 
-    fn around_lamps(paths: usize, eighths: usize) -> usize {
-        paths * eighths / 8
+    /// How many of a batch's paths are around lamps.
+    fn around_lamps(&self, eighths: usize) -> usize {
+        self.paths * eighths / LAMP_EIGHTHS
+    }
+
+    fn set(&self, eighths: usize) -> &PatternSet {
+        self.sets[eighths].get_or_init(|| {
+            let n = self.paths - self.around_lamps(eighths);
+            let directions: Vec<Vec3> = (0..self.group)
+                .flat_map(|member| {
+                    let key = Key {
+                        seed: 0,
+                        purpose: Purpose::Record,
+                        index: member as u64,
+                    };
+                    let u = random_rotation(&mut Sampler::new(key, 0));
+                    SphericalFibonacci::new(n as u32, u).iter()
+                })
+                .collect();
+            PatternSet {
+                cells: SphericalVoronoi::new(&directions),
+                directions,
+            }
+        })
     }
 }
+
+const LAMP_EIGHTHS: usize = 8;
 
 /// Gathers multiple-scattered light at `x` along `pattern`, weighting all directions alike.
 ///
@@ -219,20 +248,30 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     key: Key,
 ) -> Gathered {
     let directions = GatherDirections::new(world, x, towards);
-    let eighths = ((8.0 * directions.lamps.share()).ceil() as usize).min(LAMP_LEVELS - 1);
-    let set = &pattern.sets[eighths];
-    let share = GatherPattern::around_lamps(pattern.paths, eighths) as f32 / pattern.paths as f32;
+    let share = directions.lamps.share();
+    let eighths = ((LAMP_EIGHTHS as f32 * share).ceil() as usize).min(LAMP_LEVELS - 1);
+    let set = pattern.set(eighths);
+    let around_lamps = pattern.around_lamps(eighths);
+    let in_pattern = pattern.paths - around_lamps;
+    let share = around_lamps as f32 / pattern.paths as f32;
     let sampler = |batch: usize, i: usize| Sampler::new(batch_key(key, batch), i as u64);
+    // Drawn from a sample that no path has.
+    let turn = |group: usize| {
+        let u = random_rotation(&mut sampler(group * pattern.group, pattern.paths));
+        SphericalFibonacci::new(1, u).rotation()
+    };
 
     let starts: Vec<(Start, GatherDirection)> = (0..BATCHES)
         .flat_map(|batch| {
-            let turn = random_rotation(&mut sampler(batch, pattern.paths));
+            let (group, member) = (batch / pattern.group, batch % pattern.group);
+            let turn = turn(group);
             let directions = &directions;
             (0..pattern.paths).map(move |i| {
-                let u = sampler(batch, i).next_2d();
-                let direction = match set.directions.get(i) {
-                    Some(&d) => directions.along_pattern((turn * d).normalize(), share),
-                    None => directions.around_lamp(u, share),
+                let direction = if i < in_pattern {
+                    let d = turn * set.directions[member * in_pattern + i];
+                    directions.along_pattern(d.normalize(), share)
+                } else {
+                    directions.around_lamp(sampler(batch, i).next_2d(), share)
                 };
                 let ray = Ray::new(x, direction.w_i);
                 let start = Start {
@@ -259,9 +298,8 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     let aware = derivatives == Derivatives::Aware && nearest.is_finite();
 
     let mut batches = Batches::default();
-    let mut seen = Vec::with_capacity(pattern.paths);
+    let mut seen = Vec::with_capacity(set.directions.len());
     for (batch, starts) in starts.chunks(pattern.paths).enumerate() {
-        seen.clear();
         for (i, (start, direction)) in starts.iter().enumerate() {
             let mut sampler = sampler(batch, i);
             let mut visitor = WarpVisitor::new(world.media, x, radius, w_o);
@@ -273,7 +311,7 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
                 visitor.value * weight,
                 [dr * weight.x, dg * weight.y, db * weight.z],
             );
-            if aware && i < set.directions.len() {
+            if aware && i < in_pattern {
                 seen.push(Seen::new(
                     direction.w_i,
                     start.hit.flatten(),
@@ -281,20 +319,26 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
                 ));
             }
         }
-        if aware {
-            let turn = random_rotation(&mut sampler(batch, pattern.paths));
-            let phase = |w_i: Vec3| directions.phase(w_i);
-            let moved = match &directions.lobe {
-                None => occlusion::gradient(set.cells.borders(), turn, x, &seen, phase),
-                // Directions drawn by a phase function make cells of their own.
-                Some(_) => {
-                    let drawn: Vec<Vec3> = seen.iter().map(|s| s.direction).collect();
-                    let cells = SphericalVoronoi::new(&drawn);
-                    occlusion::gradient(cells.borders(), Quat::IDENTITY, x, &seen, phase)
-                }
-            };
-            batches.add_to_gradient(batch, moved);
+        if seen.len() < set.directions.len() {
+            continue;
         }
+        // The group is complete. A border's share goes to the batch of the ray that sees what is hidden.
+        let group = batch / pattern.group;
+        let phase = |w_i: Vec3| directions.phase(w_i);
+        let add = |far: usize, moved: [Vec3; 3]| {
+            let batch = group * pattern.group + far / in_pattern;
+            batches.add_to_gradient(batch, moved.map(|m| m * pattern.group as f32));
+        };
+        match &directions.lobe {
+            None => occlusion::gradient(set.cells.borders(), turn(group), x, &seen, phase, add),
+            // Directions drawn by a phase function make cells of their own.
+            Some(_) => {
+                let drawn: Vec<Vec3> = seen.iter().map(|s| s.direction).collect();
+                let cells = SphericalVoronoi::new(&drawn);
+                occlusion::gradient(cells.borders(), Quat::IDENTITY, x, &seen, phase, add);
+            }
+        }
+        seen.clear();
     }
     let [value, dr, dg, db] = batches.means();
     let [value_error, er, eg, eb] = batches.errors();
@@ -308,10 +352,10 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     }
 }
 
-/// A rotation even among all, for a batch whose first number of the next sample's set is free.
-fn random_rotation(sampler: &mut Sampler) -> Quat {
+/// Three numbers in [0, 1) that choose a rotation.
+fn random_rotation(sampler: &mut Sampler) -> [f32; 3] {
     let [u, v] = sampler.next_2d();
-    SphericalFibonacci::new(1, [u, v, sampler.next_1d()]).rotation()
+    [u, v, sampler.next_1d()]
 }
 
 /// One path's estimate of (1/4π) ∫ L dω at `x`, light straight from emitters left out: what a record there would hold, unbiased

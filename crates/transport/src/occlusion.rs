@@ -93,7 +93,8 @@ fn silhouette<'s>(x: Vec3, w: Vec3, near: &'s Seen, far: &'s Seen) -> Option<Sil
     }
 }
 
-/// The share of ∇∫ p L dω that silhouettes bring, per colour channel, for points that stay where they are while `x` moves.
+/// The share of ∇∫ p L dω that silhouettes bring, per colour channel, for points that stay where they are while `x` moves; told to `add`
+/// border by border, with the index of the ray that sees what is hidden there.
 ///
 /// ∇ = Σ over borders of −(Σₜ L κ(t)) p E,  κ(t) = 1 − r/t for t > r,  E = [`edge`] of the border at the nearer depth r
 ///
@@ -104,25 +105,26 @@ fn silhouette<'s>(x: Vec3, w: Vec3, near: &'s Seen, far: &'s Seen) -> Option<Sil
 /// in media outside the displacement field of [`crate::warp_translation`], stay in place. The nearer surface keeps its own points, so
 /// its light does not count. Derived from the motion of borders as in Ward and Heckbert 1992, with media behind as in Jarosz, Zwicker
 /// and Jensen 2008, "Irradiance gradients in the presence of participating media and occlusions"; the border at the nearer depth
-/// between Voronoi cells needs 8 to 18 times fewer rays than triangles through the hit points (Schwarzhaupt, Jensen and Jarosz 2012).
+/// between Voronoi cells needs two to three times fewer rays than triangles through the hit points (Schwarzhaupt, Jensen and Jarosz 2012;
+/// measured in docs/derivatives.md).
 pub(crate) fn gradient(
     borders: &[Border],
     turn: Quat,
     x: Vec3,
     seen: &[Seen],
     phase: impl Fn(Vec3) -> Vec3,
-) -> [Vec3; 3] {
-    let mut sum = [Vec3::ZERO; 3];
+    mut add: impl FnMut(usize, [Vec3; 3]),
+) {
     for Border { cells, ends } in borders {
         let [i, j] = cells.map(|c| &seen[c as usize]);
         let ends = ends.map(|end| turn * end);
         let Some(w) = (ends[0] + ends[1]).try_normalize() else {
             continue;
         };
-        let (found, side) = match silhouette(x, w, i, j) {
-            Some(found) => (found, -1.0),
+        let (found, far, side) = match silhouette(x, w, i, j) {
+            Some(found) => (found, cells[1], -1.0),
             None => match silhouette(x, w, j, i) {
-                Some(found) => (found, 1.0),
+                Some(found) => (found, cells[0], 1.0),
                 None => continue,
             },
         };
@@ -134,9 +136,9 @@ pub(crate) fn gradient(
         let [a, b] = ends.map(|end| end.as_dvec3());
         let motion = edge(a, b).as_vec3() * side;
         let change = hidden * phase(w);
-        for (c, sum) in sum.iter_mut().enumerate() {
-            *sum += motion * change[c];
-        }
+        add(
+            far as usize,
+            change.to_array().map(|change| motion * change),
+        );
     }
-    sum
 }
