@@ -26,6 +26,8 @@ pub struct PhaseValue {
     pub value: Vec3,
     /// Its derivative with respect to the cosine of scattering μ = −`w_i` · `w_o`.
     pub slope: Vec3,
+    /// Its second derivative with respect to μ.
+    pub curvature: Vec3,
     /// Its gradient per metre and channel when the point moves and the directions stay: media of different phase
     /// functions change their shares.
     pub gradient: [Vec3; 3],
@@ -81,12 +83,15 @@ impl<'a> MediumPoint<'a> {
     ///
     /// A channel that does not scatter is taken to scatter equally in all directions.
     pub fn phase(&self, w_o: Vec3, w_i: Vec3) -> PhaseValue {
-        let (mut sum, mut slope, mut moved) = (Vec3::ZERO, Vec3::ZERO, [Vec3::ZERO; 3]);
+        let (mut sum, mut slope, mut curvature) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        let mut moved = [Vec3::ZERO; 3];
         for lobe in &self.lobes {
             let medium = lobe.medium;
-            let value = medium.phase().eval(w_o, w_i);
-            sum += medium.sigma_s() * (lobe.density * value);
-            slope += medium.sigma_s() * (lobe.density * medium.phase().slope(w_o, w_i));
+            let [value, d_value, d2_value] = medium.phase().derivatives(w_o, w_i);
+            let sigma_s = medium.sigma_s() * lobe.density;
+            sum += sigma_s * value;
+            slope += sigma_s * d_value;
+            curvature += sigma_s * d2_value;
             let gradient = medium.density().gradient(self.position) * value;
             for (channel, moved) in moved.iter_mut().enumerate() {
                 *moved += medium.sigma_s()[channel] * gradient;
@@ -104,6 +109,7 @@ impl<'a> MediumPoint<'a> {
         PhaseValue {
             value,
             slope: Vec3::select(scatters, slope / self.sigma_s, Vec3::ZERO),
+            curvature: Vec3::select(scatters, curvature / self.sigma_s, Vec3::ZERO),
             gradient: std::array::from_fn(|c| {
                 if mixes && scatters.test(c) {
                     moved[c] / self.sigma_s[c] - density[c] * value[c]

@@ -2,12 +2,13 @@
 //! multiple scattering is made of, with its gradient.
 //!
 //! The crate sees a scene through two small traits, so that anything which can be hit and anything that shines will do; a
-//! medium is one of `tyndall-media`. Four things to know:
+//! medium is one of `tyndall-media`. Five things to know:
 //!
 //! * [`World`]: surfaces ([`Geometry`]), lights ([`Lights`]) and media, borrowed, together;
 //! * [`path::trace`]: one path through a world; a [`path::Visitor`] hears of every vertex and of all light it finds.
 //!   [`layers::LayerVisitor`] sorts that light into the layers of an image;
 //! * [`single::SegmentLight`]: light scattered once on a ray, straight from the lights, also right beside a lamp;
+//! * [`inscatter::single`]: the same at one point, with gradient and Hessian;
 //! * [`gather::multiple`]: light scattered before that arrives at a point, its gradient, and the standard errors of both.
 //!
 //! # Example
@@ -78,6 +79,7 @@ pub mod bsdf;
 pub mod emission;
 pub mod free_flight;
 pub mod gather;
+pub mod inscatter;
 pub mod lamp_directions;
 pub mod layers;
 pub mod light_choice;

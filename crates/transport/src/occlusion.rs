@@ -4,8 +4,9 @@
 //! ray sees beyond it, and when the point moves that border shifts by one over its depth.
 
 use crate::warp_translation::Arrivals;
-use crate::world::SurfaceHit;
+use crate::world::{LightSample, SurfaceHit};
 use glam::{Quat, Vec3};
+use smallvec::smallvec;
 use tyndall_math::spherical::{Border, edge};
 
 /// Two planes count as one where they lie closer than this, relative to their distance.
@@ -16,28 +17,58 @@ const APART: f32 = 1.5;
 /// Just short of a surface.
 const BARELY: f32 = 1.0 - 1e-5;
 
-/// What a gather ray saw.
+/// What a gather ray saw, or a ray towards a light.
 #[derive(Clone, Debug)]
 pub(crate) struct Seen {
     /// Unit direction of the ray.
     pub(crate) direction: Vec3,
-    hit: Option<SurfaceHit>,
+    hit: Option<Hit>,
     arrivals: Arrivals,
 }
 
-/// A silhouette between two rays: which of them it hides something from, and one over its distance.
-struct Silhouette<'s> {
-    far: &'s Seen,
-    inverse_depth: f32,
+/// Where a ray ended.
+#[derive(Clone, Copy, Debug)]
+struct Hit {
+    t: f32,
+    position: Vec3,
+    normal: Vec3,
+    /// Extent of the piece of surface, in metres.
+    size: f32,
 }
 
 impl Seen {
     pub(crate) fn new(direction: Vec3, hit: Option<SurfaceHit>, arrivals: Arrivals) -> Self {
         Self {
             direction,
-            hit,
+            hit: hit.map(|hit| Hit {
+                t: hit.t,
+                position: hit.position,
+                normal: hit.normal,
+                size: hit.size,
+            }),
             arrivals,
         }
+    }
+
+    /// `light` with extent, seen freely from `x`, from where `radiance` arrives.
+    pub(crate) fn light(x: Vec3, light: &LightSample, radiance: Vec3) -> Self {
+        let t = light.distance;
+        Self {
+            direction: light.w_i,
+            hit: t.is_finite().then(|| Hit {
+                t,
+                position: x + light.w_i * t,
+                // An emitter without a surface ends the ray squarely.
+                normal: light.normal.try_normalize().unwrap_or(-light.w_i),
+                size: light.size,
+            }),
+            arrivals: smallvec![(t, radiance)],
+        }
+    }
+
+    /// Whether light arrives along the ray.
+    pub(crate) fn shines(&self) -> bool {
+        !self.arrivals.is_empty()
     }
 
     /// Σ v (1/r − 1/t): light per metre of sideways motion that is hidden by a surface at r, over what arrives from t beyond.
@@ -57,8 +88,14 @@ impl Seen {
     }
 }
 
+/// A silhouette between two rays: what it hides something from, and one over its distance.
+struct Silhouette<'s> {
+    far: &'s Seen,
+    inverse_depth: f32,
+}
+
 /// One over the distance at which the plane of `hit` is seen from `x` in direction `w`: linear in `w`, not positive where it is not seen.
-fn inverse_depth(hit: &SurfaceHit, x: Vec3, w: Vec3) -> f32 {
+fn inverse_depth(hit: &Hit, x: Vec3, w: Vec3) -> f32 {
     w.dot(hit.normal) / (hit.position - x).dot(hit.normal)
 }
 
@@ -77,8 +114,7 @@ fn silhouette<'s>(x: Vec3, w: Vec3, near: &'s Seen, far: &'s Seen) -> Option<Sil
     let Some(there) = &far.hit else {
         return found;
     };
-    let in_front =
-        |a: &SurfaceHit, w: Vec3, b: &SurfaceHit| inverse_depth(a, x, w) * b.t > 1.0 + COPLANAR;
+    let in_front = |a: &Hit, w: Vec3, b: &Hit| inverse_depth(a, x, w) * b.t > 1.0 + COPLANAR;
     match (
         in_front(here, far.direction, there),
         in_front(there, near.direction, here),

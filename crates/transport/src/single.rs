@@ -201,23 +201,7 @@ pub fn unoccluded<G: Geometry, L>(
     p: Vec3,
     light: &LightSample,
 ) -> Option<Vec3> {
-    let (ray, distance) = if light.distance.is_finite() {
-        let point = p + light.w_i * light.distance;
-        let target = if light.normal == Vec3::ZERO {
-            point
-        } else {
-            offset_origin(point, light.normal, light.size)
-        };
-        let distance = target.distance(origin);
-        let direction = (target - origin).try_normalize()?;
-        // Rounding of the distance itself.
-        (
-            Ray::new(origin, direction),
-            distance * (1.0 - 4.0 * f32::EPSILON),
-        )
-    } else {
-        (Ray::new(origin, light.w_i), light.distance)
-    };
+    let (ray, distance) = shadow_ray(origin, p, light)?;
     if world.geometry.occluded(&ray, distance) {
         return None;
     }
@@ -225,4 +209,22 @@ pub fn unoccluded<G: Geometry, L>(
         return Some(Vec3::ONE);
     }
     Some(transmittance(world.media.optical_depth(&ray, distance)))
+}
+
+/// The ray from `origin` to the light that `light` samples from `p`, and how far surfaces on it count.
+pub(crate) fn shadow_ray(origin: Vec3, p: Vec3, light: &LightSample) -> Option<(Ray, f32)> {
+    if light.distance.is_infinite() {
+        return Some((Ray::new(origin, light.w_i), light.distance));
+    }
+    let point = p + light.w_i * light.distance;
+    let target = if light.normal == Vec3::ZERO {
+        point
+    } else {
+        offset_origin(point, light.normal, light.size)
+    };
+    let distance = target.distance(origin);
+    let direction = (target - origin).try_normalize()?;
+    // Rounding of the distance itself.
+    let distance = distance * (1.0 - 4.0 * f32::EPSILON);
+    Some((Ray::new(origin, direction), distance))
 }

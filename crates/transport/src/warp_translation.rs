@@ -23,7 +23,7 @@ use tyndall_math::Ray;
 use tyndall_media::Media;
 
 /// Cosines on surfaces are kept above this in ∂ ln cosθ, which diverges at grazing incidence.
-const COS_MIN: f32 = 1e-3;
+pub(crate) const COS_MIN: f32 = 1e-3;
 
 /// An end of a path segment: where it is, how it moves, and the normal where it lies on a surface.
 #[derive(Clone, Copy)]

@@ -3,8 +3,8 @@
 //! `tyndall-scene` implements these traits for files; a test implements them for a box and two lamps in ten lines.
 
 use crate::bsdf::Bsdf;
-use glam::Vec3;
-use tyndall_math::{Ray, offset_origin};
+use glam::{DVec3, Vec3};
+use tyndall_math::{Jet, Ray, offset_origin};
 use tyndall_media::Media;
 
 /// Opaque surfaces.
@@ -72,10 +72,10 @@ pub trait Lights: Sync {
     /// Radiance that arrives from direction `w_i` (pointing away from the scene) out of environment light `light`.
     fn environment_radiance(&self, light: usize, w_i: Vec3) -> Vec3;
 
-    /// ∇ ln I per metre, where the intensity that `light` sends to `p` depends on the direction it leaves in (a spot's
-    /// falloff); zero for other lights.
-    fn grad_ln_intensity(&self, _light: usize, _p: Vec3) -> Vec3 {
-        Vec3::ZERO
+    /// ln I with its derivatives per metre, up to a constant, where the intensity that `light` sends to `p` depends on the
+    /// direction it leaves in (a spot's falloff); zero for other lights.
+    fn ln_intensity(&self, _light: usize, _p: DVec3) -> Jet {
+        Jet::ZERO
     }
 
     /// Distance from `p` to the nearest point-like light (point or spot), infinite where there is none.

@@ -3,6 +3,7 @@
 use crate::args::ProbeArgs;
 use crate::error::CliError;
 use crate::output;
+use std::fmt::LowerExp;
 use tyndall_render::probe::{Part, Probe, ProbeOptions, probe};
 
 pub(super) fn run(args: &ProbeArgs) -> Result<(), CliError> {
@@ -40,16 +41,21 @@ fn part_lines(name: &str, part: &Part) -> Vec<String> {
         triple(part.value),
         triple(part.stderr)
     )];
-    for (c, channel) in ["red", "green", "blue"].iter().enumerate() {
+    let channels = ["red", "green", "blue"];
+    for (c, channel) in channels.iter().enumerate() {
         lines.push(format!(
             "  gradient of {channel:<6} {} ± {} /m",
             triple(part.gradient[c]),
             triple(part.gradient_stderr[c])
         ));
     }
+    for (channel, rows) in channels.iter().zip(part.hessian.iter().flatten()) {
+        let rows = rows.map(triple).join(" ");
+        lines.push(format!("  Hessian of {channel:<7} {rows} /m²"));
+    }
     lines
 }
 
-fn triple(v: [f32; 3]) -> String {
+fn triple<T: LowerExp>(v: [T; 3]) -> String {
     format!("({:.5e}, {:.5e}, {:.5e})", v[0], v[1], v[2])
 }

@@ -76,12 +76,17 @@ impl HenyeyGreenstein {
         h * (1.0 + a) / (4.0 * PI * d * d.sqrt())
     }
 
-    /// dp/dμ, per steradian: 3 g p / (1 + g² − 2 g μ).
-    pub fn slope(&self, w_o: Vec3, w_i: Vec3) -> f32 {
+    /// p, dp/dμ and d²p/dμ², per steradian.
+    ///
+    /// p′ = 3 g p / D,  p″ = 15 g² p / D²,  D = 1 + g² − 2 g μ
+    #[inline]
+    pub fn derivatives(&self, w_o: Vec3, w_i: Vec3) -> [f32; 3] {
         let (a, peak) = self.peak(w_o);
         let h = 1.0 - a;
         let d = h * h + a * (w_i - peak).length_squared();
-        3.0 * self.g.0 * self.eval(w_o, w_i) / d
+        let p = h * (1.0 + a) / (4.0 * PI * d * d.sqrt());
+        let q = self.g.0 / d;
+        [p, 3.0 * q * p, 15.0 * q * q * p]
     }
 
     /// A direction `w_i` drawn in proportion to [`HenyeyGreenstein::eval`], and that value.

@@ -46,11 +46,12 @@ impl PhaseFunction {
         }
     }
 
-    /// How the value changes with the cosine of scattering: dp/dμ, per steradian.
-    pub fn slope(&self, w_o: Vec3, w_i: Vec3) -> f32 {
+    /// The value and how it changes with the cosine of scattering: p, dp/dμ and d²p/dμ², per steradian.
+    #[inline]
+    pub fn derivatives(&self, w_o: Vec3, w_i: Vec3) -> [f32; 3] {
         match self {
-            Self::Isotropic => 0.0,
-            Self::HenyeyGreenstein(hg) => hg.slope(w_o, w_i),
+            Self::Isotropic => [ISOTROPIC, 0.0, 0.0],
+            Self::HenyeyGreenstein(hg) => hg.derivatives(w_o, w_i),
         }
     }
 
@@ -131,21 +132,25 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_is_that_of_the_value() {
+    fn slope_and_curvature_are_those_of_the_value() {
         let h = 1e-3_f32;
         for g in [-0.7, 0.0, 0.3, 0.8] {
             let phase = PhaseFunction::henyey_greenstein(g).unwrap();
             for angle in [0.3_f32, 1.0, 2.0, 3.0] {
                 let w = |angle: f32| -Vec3::new(angle.sin(), 0.0, angle.cos());
-                let rise = phase.eval(Vec3::Z, w(angle - h)) - phase.eval(Vec3::Z, w(angle + h));
-                let slope = rise / ((angle - h).cos() - (angle + h).cos());
-                let found = phase.slope(Vec3::Z, w(angle));
-                // Rounding of the difference: 1e-7 of the value over a step of 2h sin(angle).
-                let rounding = 5e-4 / angle.sin() * phase.eval(Vec3::Z, w(angle));
-                assert!(
-                    (found - slope).abs() < 1e-3 * slope.abs() + rounding,
-                    "{g} {angle}: {found} {slope}"
-                );
+                let [below, here, above] =
+                    [h, 0.0, -h].map(|h| phase.derivatives(Vec3::Z, w(angle + h)));
+                assert_eq!(here[0], phase.eval(Vec3::Z, w(angle)));
+                for k in [0, 1] {
+                    let slope = (above[k] - below[k]) / ((angle - h).cos() - (angle + h).cos());
+                    // Rounding of the difference: 1e-7 of the function over a step of 2h sin(angle).
+                    let rounding = 5e-4 / angle.sin() * here[k].abs();
+                    let found = here[k + 1];
+                    assert!(
+                        (found - slope).abs() <= 1e-3 * slope.abs() + rounding,
+                        "{g} {angle}: {found} {slope}"
+                    );
+                }
             }
         }
     }

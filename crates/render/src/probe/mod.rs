@@ -1,23 +1,21 @@
 //! Scattered light at one point: value and gradient of single and multiple scattering, with standard errors.
 //!
-//! Single scattering is sampled towards the lights and by the phase function, with exact derivatives of every sample; multiple
-//! scattering is that of one fresh record, or of paths and finite differences where the ground truth is asked for.
+//! Single scattering is sampled towards the lights and by the phase function, with exact derivatives of every sample and the motion of
+//! shadows; multiple scattering is that of one fresh record, or of paths and finite differences where the ground truth is asked for.
 
 mod paths;
-mod single;
 
 pub use paths::by_paths;
-pub use single::single;
 pub use tyndall_transport::gather::Derivatives;
 
 use crate::options::Integrator;
 use glam::Vec3;
 use serde::Serialize;
-use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose};
 use tyndall_scene::Scene;
 use tyndall_transport::Lights;
 use tyndall_transport::gather::{self, GatherPattern};
+use tyndall_transport::inscatter::{self, Inscattered, Order};
 
 /// What to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +77,21 @@ pub struct Part {
     pub gradient: [[f32; 3]; 3],
     /// Standard error of the gradient.
     pub gradient_stderr: [[f32; 3]; 3],
+    /// Second derivatives per square metre, 3 × 3 for red, green and blue, where they are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hessian: Option<[[[f64; 3]; 3]; 3]>,
+}
+
+impl From<Inscattered> for Part {
+    fn from(found: Inscattered) -> Self {
+        Self {
+            value: found.value.into(),
+            stderr: found.value_error.into(),
+            gradient: found.gradient.map(Into::into),
+            gradient_stderr: found.gradient_error.map(Into::into),
+            hessian: found.hessian.map(|h| h.map(|h| h.to_cols_array_2d())),
+        }
+    }
 }
 
 /// What `tyndall probe` tells.
@@ -147,8 +160,11 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
                 stderr: g.value_error.to_array(),
                 gradient: g.gradient.map(Into::into),
                 gradient_stderr: g.gradient_error.map(Into::into),
+                hessian: None,
             };
-            (single(&world, options.at, towards, samples, key), multiple)
+            let asked = (Order::Hessian, options.derivatives);
+            let single = inscatter::single(&world, options.at, towards, samples, asked, key);
+            (single.into(), multiple)
         }
     };
     let medium = scene.media.at(options.at);
@@ -157,56 +173,6 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
         multiple,
         sigma_t: medium.sigma_t.to_array(),
         sigma_s: medium.sigma_s.to_array(),
-    })
-}
-
-/// Independent batches from whose spread standard errors are taken; within one, samples are stratified.
-const BATCHES: usize = 32;
-
-/// Value and gradient of one sample.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sample {
-    value: Vec3,
-    gradient: [Vec3; 3],
-}
-
-/// Averages `samples` samples of several parts; `sample` is given the key of the batch and the number in it.
-fn average<const N: usize>(
-    samples: usize,
-    key: Key,
-    mut sample: impl FnMut(Key, u64) -> [Sample; N],
-) -> [Part; N] {
-    let batches = samples.clamp(1, BATCHES);
-    let mut spread = [[Welford::new(); 12]; N];
-    for batch in 0..batches {
-        let key = Key {
-            index: (key.index << 8) | batch as u64,
-            ..key
-        };
-        // Batches differ by at most one sample: samples are dealt out in turn.
-        let n = (samples - batch).div_ceil(batches).max(1);
-        let mut sums = [[0.0f64; 12]; N];
-        for i in 0..n {
-            for (sum, part) in sums.iter_mut().zip(sample(key, i as u64)) {
-                let numbers = [part.value].into_iter().chain(part.gradient);
-                for (sum, x) in sum.iter_mut().zip(numbers.flat_map(|v| v.to_array())) {
-                    *sum += f64::from(x);
-                }
-            }
-        }
-        for (spread, sum) in spread.iter_mut().flatten().zip(sums.iter().flatten()) {
-            spread.push(sum / n as f64);
-        }
-    }
-    spread.map(|numbers| {
-        let triple =
-            |i: usize, f: fn(&Welford) -> f64| [0, 1, 2].map(|c| f(&numbers[3 * i + c]) as f32);
-        Part {
-            value: triple(0, Welford::mean),
-            stderr: triple(0, Welford::standard_error),
-            gradient: [1, 2, 3].map(|i| triple(i, Welford::mean)),
-            gradient_stderr: [1, 2, 3].map(|i| triple(i, Welford::standard_error)),
-        }
     })
 }
 

@@ -2,11 +2,12 @@
 //!
 //! Paths on both sides of the point share their random numbers, so that most of their noise cancels in the difference.
 
-use super::single::Point;
-use super::{Part, Sample, average};
+use super::Part;
 use glam::Vec3;
+use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Ray, Sampler};
 use tyndall_transport::gather::{self, GatherDirections};
+use tyndall_transport::inscatter::Inscatter;
 use tyndall_transport::{Geometry, Lights, World};
 
 /// The step of the differences as a share of the length over which light changes: its square is their relative error.
@@ -77,7 +78,7 @@ fn length<G: Geometry, L: Lights>(world: &World<'_, G, L>, x: Vec3, key: Key) ->
 struct Place<'w, 'm, G, L> {
     world: &'w World<'m, G, L>,
     x: Vec3,
-    point: Point<'w, 'm, G, L>,
+    point: Inscatter<'w, 'm, G, L>,
     directions: GatherDirections<'m>,
     max_depth: Option<u32>,
 }
@@ -92,7 +93,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Place<'w, 'm, G, L> {
         Self {
             world,
             x,
-            point: Point::new(world, x, towards),
+            point: Inscatter::new(world, x, towards),
             directions: GatherDirections::new(world, x, towards),
             max_depth,
         }
@@ -108,6 +109,57 @@ impl<'w, 'm, G: Geometry, L: Lights> Place<'w, 'm, G, L> {
             self.max_depth,
             &mut sampler,
         );
-        [self.point.sample(key, i, false).value, multiple]
+        [self.point.value(key, i), multiple]
     }
+}
+
+/// Independent batches from whose spread standard errors are taken; within one, samples are stratified.
+const BATCHES: usize = 32;
+
+/// Value and gradient of one sample.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sample {
+    value: Vec3,
+    gradient: [Vec3; 3],
+}
+
+/// Averages `samples` samples of several parts; `sample` is given the key of the batch and the number in it.
+fn average<const N: usize>(
+    samples: usize,
+    key: Key,
+    mut sample: impl FnMut(Key, u64) -> [Sample; N],
+) -> [Part; N] {
+    let batches = samples.clamp(1, BATCHES);
+    let mut spread = [[Welford::new(); 12]; N];
+    for batch in 0..batches {
+        let key = Key {
+            index: (key.index << 8) | batch as u64,
+            ..key
+        };
+        // Batches differ by at most one sample: samples are dealt out in turn.
+        let n = (samples - batch).div_ceil(batches).max(1);
+        let mut sums = [[0.0f64; 12]; N];
+        for i in 0..n {
+            for (sum, part) in sums.iter_mut().zip(sample(key, i as u64)) {
+                let numbers = [part.value].into_iter().chain(part.gradient);
+                for (sum, x) in sum.iter_mut().zip(numbers.flat_map(|v| v.to_array())) {
+                    *sum += f64::from(x);
+                }
+            }
+        }
+        for (spread, sum) in spread.iter_mut().flatten().zip(sums.iter().flatten()) {
+            spread.push(sum / n as f64);
+        }
+    }
+    spread.map(|numbers| {
+        let triple =
+            |i: usize, f: fn(&Welford) -> f64| [0, 1, 2].map(|c| f(&numbers[3 * i + c]) as f32);
+        Part {
+            value: triple(0, Welford::mean),
+            stderr: triple(0, Welford::standard_error),
+            gradient: [1, 2, 3].map(|i| triple(i, Welford::mean)),
+            gradient_stderr: [1, 2, 3].map(|i| triple(i, Welford::standard_error)),
+            hessian: None,
+        }
+    })
 }

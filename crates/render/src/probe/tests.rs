@@ -71,6 +71,37 @@ fn records_and_paths_tell_the_same_light_and_gradients() {
 }
 
 #[test]
+fn the_hessian_is_the_slope_of_the_gradient_and_told_where_it_is_known() {
+    let scene = scene(FOG);
+    let good = options(Integrator::Cache, 64);
+    let found = probe(&scene, &good).unwrap();
+    assert_eq!(found.multiple.hessian, None);
+    let path = probe(&scene, &options(Integrator::Path, 16)).unwrap();
+    assert_eq!((path.single.hessian, path.multiple.hessian), (None, None));
+    let h = 0.01;
+    let hessian = found.single.hessian.unwrap();
+    for (i, axis) in Vec3::AXES.into_iter().enumerate() {
+        // The same seed: lamps without extent, in the same shares.
+        let [a, b] = [h, -h].map(|h| {
+            let at = good.at + h * axis;
+            probe(&scene, &ProbeOptions { at, ..good }).unwrap().single
+        });
+        for (c, hessian) in hessian.iter().enumerate() {
+            let numbers = hessian.iter().flatten();
+            let size = numbers.fold(0.0, |most: f64, number| most.max(number.abs()));
+            for (j, found) in hessian[i].iter().enumerate() {
+                let slope = f64::from(a.gradient[c][j] - b.gradient[c][j]) / f64::from(2.0 * h);
+                // (h/r)² of fourth derivatives, and the choice of lamps moves with the point.
+                assert!(
+                    (found - slope).abs() < 0.02 * size,
+                    "{c} {i} {j}: {found} {slope}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn questions_without_an_answer_are_refused() {
     let forward = scene(FOG);
     let good = options(Integrator::Cache, 16);

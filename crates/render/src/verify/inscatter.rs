@@ -6,10 +6,11 @@
 use super::measure::{Light, Point, World, point_rows};
 use super::world::{Lamp, Lamps, Shape, Solid, Solids, fog};
 use super::{Budget, Row, Task};
-use crate::probe;
 use glam::{DVec3, Vec3};
 use tyndall_math::{Key, Purpose};
 use tyndall_media::Region;
+use tyndall_transport::gather::Derivatives;
+use tyndall_transport::inscatter::{self, Order};
 
 const FAMILY: &str = "E2b";
 const X: Vec3 = Vec3::new(0.3, 0.2, 0.1);
@@ -188,8 +189,9 @@ fn point(&(g, value, gradient): &(f32, f64, [f64; 3])) -> Vec<Row> {
         purpose: Purpose::Probe,
         index: 0,
     };
-    let part = probe::single(&world, X, Some(TOWARDS.normalize()), 1, key);
-    let found = part.gradient.map(|d| Vec3::from(d).as_dvec3());
+    let asked = (Order::Gradient, Derivatives::Aware);
+    let found = inscatter::single(&world, X, Some(TOWARDS.normalize()), 1, asked, key);
+    let slope = found.gradient[0].as_dvec3();
     let exact = DVec3::from(gradient);
     // A dozen f32 roundings; at g = 0.9 the peak magnifies those of the angle.
     let tolerance = 3e-6;
@@ -197,14 +199,14 @@ fn point(&(g, value, gradient): &(f32, f64, [f64; 3])) -> Vec<Row> {
         Row::fixed(
             FAMILY,
             format!("point lamp, g {g}: value"),
-            part.value[0].into(),
+            found.value.x.into(),
             value,
             tolerance * value,
         ),
         Row::fixed(
             FAMILY,
             format!("point lamp, g {g}: gradient, distance from exact"),
-            found[0].distance(exact),
+            slope.distance(exact),
             0.0,
             tolerance * exact.length(),
         ),

@@ -4,11 +4,11 @@
 
 use super::world::{Lamps, Solids};
 use super::{Budget, Row};
-use crate::probe;
 use glam::Vec3;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Ray, Sampler};
 use tyndall_transport::gather::{self, Derivatives, GatherPattern};
+use tyndall_transport::inscatter::{self, Order};
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Start, trace};
 
@@ -217,8 +217,9 @@ fn measure(world: &World<'_>, key: Key, rays: usize, point: &Point) -> (f64, [f6
         add(g.value, g.gradient);
     }
     if point.light != Light::Multiple {
-        let part = probe::single(world, point.x, point.towards, rays, key);
-        add(part.value.into(), part.gradient.map(Vec3::from));
+        let asked = (Order::Gradient, Derivatives::Aware);
+        let found = inscatter::single(world, point.x, point.towards, rays, asked, key);
+        add(found.value, found.gradient);
     }
     (value, gradient)
 }

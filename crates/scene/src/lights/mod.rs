@@ -33,12 +33,12 @@ pub use triangle::TriangleLight;
 
 use crate::gltf::punctual::PunctualLight;
 use crate::triangles::Surfaces;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use importance::bounded;
 use std::collections::HashMap;
 use std::f32::consts::PI;
 use std::sync::Arc;
-use tyndall_math::Ray;
+use tyndall_math::{Jet, Ray};
 use tyndall_transport::{LightSample, Lights};
 
 /// One light.
@@ -247,10 +247,10 @@ impl Lights for LightSet {
         }
     }
 
-    fn grad_ln_intensity(&self, light: usize, p: Vec3) -> Vec3 {
+    fn ln_intensity(&self, light: usize, p: DVec3) -> Jet {
         match self.lights.get(light) {
-            Some(Light::Spot(spot)) => spot.grad_ln_falloff(p),
-            _ => Vec3::ZERO,
+            Some(Light::Spot(spot)) => spot.ln_falloff(p),
+            _ => Jet::ZERO,
         }
     }
 

@@ -4,7 +4,7 @@ use super::importance::{facing, mean};
 use super::point::towards_lamp;
 use glam::{DVec3, Vec3};
 use std::f32::consts::{PI, TAU};
-use tyndall_math::{Ray, warp::Equiangular};
+use tyndall_math::{Jet, Ray, warp::Equiangular};
 use tyndall_transport::LightSample;
 
 /// A lamp whose intensity falls off between two cones around an axis.
@@ -77,17 +77,17 @@ impl SpotLight {
         ramp * ramp
     }
 
-    /// ∇ ln of the falloff when the lit point `p` moves: 2 ∇c / (c − cosθₒ) on the ramp, with c = w·a, ∇c = (a − c w)/r.
-    pub(super) fn grad_ln_falloff(&self, p: Vec3) -> Vec3 {
-        let offset = p - self.position;
-        let r = offset.length();
-        let w = offset / r;
-        let versine = 0.5 * (w - self.direction).length_squared();
-        if r > 0.0 && versine > self.inner_versine && versine < self.outer_versine {
-            let across = self.direction - self.direction.dot(w) * w;
-            across * (2.0 / ((self.outer_versine - versine) * r))
+    /// ln of the falloff, up to a constant, with its derivatives when the lit point `p` moves: 2 ln (c − cosθₒ) on the ramp,
+    /// c = w·a; 0 elsewhere.
+    pub(super) fn ln_falloff(&self, p: DVec3) -> Jet {
+        let offset = Jet::point(p) - self.position.as_dvec3();
+        let axis = self.direction.as_dvec3().normalize();
+        let cosine = (offset / offset.length()).dot_fixed(axis);
+        let versine = 1.0 - cosine.value;
+        if versine > self.inner_versine.into() && versine < self.outer_versine.into() {
+            (cosine - (1.0 - f64::from(self.outer_versine))).ln() * 2.0
         } else {
-            Vec3::ZERO
+            Jet::ZERO
         }
     }
 
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gradient_of_the_falloff_is_its_slope() {
+    fn the_derivatives_of_the_falloff_are_its_slopes() {
         let light = spot(20.0, 40.0);
         let falloff = |p: Vec3| light.falloff(p.normalize());
         for angle in [10.0, 25.0, 33.0, 50.0] {
@@ -207,11 +207,17 @@ mod tests {
                 }
             }));
             // Third derivative over the step: (0.01 / 0.2)² of it.
-            let found = light.grad_ln_falloff(p);
+            let p = p.as_dvec3();
+            let found = light.ln_falloff(p);
             assert!(
-                (found - slope).length() <= 5e-3 * slope.length(),
-                "{angle}: {found} {slope}"
+                (found.gradient.as_vec3() - slope).length() <= 5e-3 * slope.length(),
+                "{angle}: {found:?} {slope}"
             );
+            for (i, axis) in DVec3::AXES.into_iter().enumerate() {
+                let [a, b] = [1e-5, -1e-5].map(|h| light.ln_falloff(p + h * axis).gradient);
+                // Rounding over the step.
+                assert!((found.hessian.col(i) - (a - b) / 2e-5).length() < 1e-7);
+            }
         }
     }
 

@@ -6,5 +6,7 @@
 )]
 
 mod exact;
+mod inscatter;
 mod rig;
 mod samplers;
+mod stage;

@@ -1,0 +1,123 @@
+//! Light that comes straight from emitters and is scattered at one point: value, gradient and Hessian from the same samples.
+//!
+//! L(x, ω) = ∫ p Lᵣ V H dx′ over the points x′ of all emitters, with ∇p, ∇Lᵣ and ∇H evaluated together with p, Lᵣ and H
+//! (Jarosz, Donner, Zwicker and Jensen 2008, "Radiance caching for participating media"):
+//!
+//! * p – phase function, 1/4π where all directions weigh alike;
+//! * Lᵣ = L e^−τ – radiance reduced by the optical depth τ between the points;
+//! * V – visibility;
+//! * H – cosθ′/r² for a point of a surface, 1/r² for a lamp without extent (L is its intensity), 1 for light from far away.
+//!
+//! Emitters stay where they are while x moves; light from far away moves with it. Shadows that move are in the gradient where
+//! [`Derivatives::Aware`] asks for them ([`silhouettes`](self) of what stands before lights with extent), never in the Hessian. Lamps
+//! without extent have hard shadows, which no derivative at a point knows of.
+
+mod light_cells;
+mod point;
+mod second_order;
+
+pub use point::Inscatter;
+
+use crate::gather::Derivatives;
+use crate::world::{Geometry, Lights, World};
+use glam::{DMat3, Vec3};
+use point::{Draw, Sample};
+use tyndall_math::Key;
+use tyndall_math::stats::Welford;
+
+/// Up to which derivative.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Order {
+    /// The value alone.
+    Value,
+    /// Value and gradient.
+    #[default]
+    Gradient,
+    /// Value, gradient and Hessian.
+    Hessian,
+}
+
+/// Single scattering at one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Inscattered {
+    /// ∫ p L dω per colour channel, W/(m² sr).
+    pub value: Vec3,
+    /// Its gradient per metre, one vector per channel; zero unless asked for.
+    pub gradient: [Vec3; 3],
+    /// Its Hessian per square metre, one symmetric matrix per channel; `None` unless asked for.
+    pub hessian: Option<[DMat3; 3]>,
+    /// Standard error of the value.
+    pub value_error: Vec3,
+    /// Standard error of each component of the gradient.
+    pub gradient_error: [Vec3; 3],
+}
+
+/// Independent batches from whose spread standard errors are taken; within one, samples are stratified.
+const BATCHES: usize = 32;
+
+/// Light scattered once at `x` towards `towards` (weighting all directions alike where `None`), from `samples` samples.
+///
+/// Value and errors do not depend on `order` and `derivatives`. The Hessian has shadows stay; it leaves out that the limb of a
+/// curved emitter moves (emitters made of flat pieces have none), and second derivatives of the shares in which
+/// media of different phase functions and changing densities mix.
+pub fn single<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    towards: Option<Vec3>,
+    samples: usize,
+    (order, derivatives): (Order, Derivatives),
+    key: Key,
+) -> Inscattered {
+    let point = Inscatter::new(world, x, towards);
+    let aware = order >= Order::Gradient && derivatives == Derivatives::Aware;
+    let batches = samples.clamp(1, BATCHES);
+    let mut spread = [[Welford::new(); 3]; 4];
+    let mut hessian = [DMat3::ZERO; 3];
+    for batch in 0..batches {
+        let key = Key {
+            index: (key.index << 8) | batch as u64,
+            ..key
+        };
+        // Batches differ by at most one sample: samples are dealt out in turn.
+        let n = (samples - batch).div_ceil(batches).max(1);
+        let mut sums = [[0.0f64; 3]; 4];
+        let mut draws: Option<Vec<Draw>> = aware.then(Vec::new);
+        for i in 0..n {
+            let sample = point.sample(key, i as u64, order, draws.as_mut());
+            add(&mut sums, sample.numbers(), 1.0 / n as f64);
+            for (sum, h) in hessian.iter_mut().zip(sample.hessian) {
+                *sum += h * (1.0 / (n * batches) as f64);
+            }
+        }
+        if let Some(draws) = draws {
+            let gradient = point.silhouettes(key, n, draws);
+            let moved = Sample {
+                gradient,
+                ..Sample::ZERO
+            };
+            add(&mut sums, moved.numbers(), 1.0);
+        }
+        for (spread, sum) in spread.iter_mut().flatten().zip(sums.as_flattened()) {
+            spread.push(*sum);
+        }
+    }
+    let of = |k: usize, f: fn(&Welford) -> f64| {
+        Vec3::from([0, 1, 2].map(|axis| f(&spread[k][axis]) as f32))
+    };
+    Inscattered {
+        value: of(0, Welford::mean),
+        gradient: [1, 2, 3].map(|k| of(k, Welford::mean)),
+        hessian: (order == Order::Hessian).then_some(hessian),
+        value_error: of(0, Welford::standard_error),
+        gradient_error: [1, 2, 3].map(|k| of(k, Welford::standard_error)),
+    }
+}
+
+/// Adds value and gradient of a sample; f64 because thousands of terms of both signs are added.
+fn add(sums: &mut [[f64; 3]; 4], numbers: [Vec3; 4], weight: f64) {
+    for (sum, v) in sums.iter_mut().zip(numbers) {
+        for (sum, number) in sum.iter_mut().zip(v.to_array()) {
+            *sum += f64::from(number) * weight;
+        }
+    }
+}
