@@ -2,14 +2,18 @@
 use super::*;
 use tyndall_scene::{LoadOptions, load_str};
 
+const SPOT: &str = "Spot(position: (-1, 0.5, 1), direction: (1.3, -0.5, -0.8), intensity: (4, 2, 1), inner_cone: 2, outer_cone: 30)";
+
 fn scene(media: &str) -> Scene {
+    let point = "Point(position: (1.1, -0.4, 1.6), intensity: (2.5, 2.5, 2.5))";
+    lit_by(&format!("{point}, {SPOT}"), media)
+}
+
+fn lit_by(lights: &str, media: &str) -> Scene {
     let text = format!(
         "Scene(
             camera: LookAt(eye: (0, 0, 5), target: (0, 0, 0), vfov: 40),
-            lights: [
-                Point(position: (1.1, -0.4, 1.6), intensity: (2.5, 2.5, 2.5)),
-                Spot(position: (-1, 0.5, 1), direction: (1.3, -0.5, -0.8), intensity: (4, 2, 1), inner_cone: 2, outer_cone: 30),
-            ],
+            lights: [{lights}],
             media: [{media}],
         )"
     );
@@ -72,7 +76,8 @@ fn records_and_paths_tell_the_same_light_and_gradients() {
 
 #[test]
 fn the_hessian_is_the_slope_of_the_gradient_and_told_where_it_is_known() {
-    let scene = scene(FOG);
+    // One lamp: with more, the choice among them moves with the point.
+    let scene = lit_by(SPOT, FOG);
     let good = options(Integrator::Cache, 64);
     let found = probe(&scene, &good).unwrap();
     assert_eq!(found.multiple.hessian, None);
@@ -81,7 +86,6 @@ fn the_hessian_is_the_slope_of_the_gradient_and_told_where_it_is_known() {
     let h = 0.01;
     let hessian = found.single.hessian.unwrap();
     for (i, axis) in Vec3::AXES.into_iter().enumerate() {
-        // The same seed: lamps without extent, in the same shares.
         let [a, b] = [h, -h].map(|h| {
             let at = good.at + h * axis;
             probe(&scene, &ProbeOptions { at, ..good }).unwrap().single
@@ -91,7 +95,7 @@ fn the_hessian_is_the_slope_of_the_gradient_and_told_where_it_is_known() {
             let size = numbers.fold(0.0, |most: f64, number| most.max(number.abs()));
             for (j, found) in hessian[i].iter().enumerate() {
                 let slope = f64::from(a.gradient[c][j] - b.gradient[c][j]) / f64::from(2.0 * h);
-                // (h/r)² of fourth derivatives, and the choice of lamps moves with the point.
+                // (h/r)² of fourth derivatives.
                 assert!(
                     (found - slope).abs() < 0.02 * size,
                     "{c} {i} {j}: {found} {slope}"
