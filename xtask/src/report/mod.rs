@@ -2,6 +2,7 @@
 //! on every run.
 
 mod axis;
+mod derivatives;
 mod plot;
 mod radius;
 mod table;
@@ -21,6 +22,8 @@ pub(crate) struct Options {
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum What {
+    /// Gradients and Hessians of gathered light near silhouettes, by the number of gather directions
+    Derivatives,
     /// Rules for a record's radius against the best radius, between two point lights in fog
     Radius,
 }
@@ -28,6 +31,7 @@ enum What {
 impl What {
     fn report(self) -> Result<Report> {
         match self {
+            Self::Derivatives => derivatives::report(),
             Self::Radius => radius::report(),
         }
     }
