@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn the_reference_is_what_a_long_gather_finds() {
         let disc = Disc::new();
-        let pattern = GatherPattern::new(1 << 18);
+        let pattern = GatherPattern::new(1 << 16);
         let key = Key {
             seed: 3,
             purpose: Purpose::Probe,
