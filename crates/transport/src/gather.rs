@@ -12,7 +12,7 @@ use glam::{Quat, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::OnceLock;
 use tyndall_math::spherical::SphericalVoronoi;
-use tyndall_math::{Key, Purpose, Ray, Sampler, SphericalFibonacci, warp};
+use tyndall_math::{Key, Ray, Sampler, SphericalFibonacci, warp};
 use tyndall_media::MediumPoint;
 
 /// Batches over which standard errors are taken; each is a stratified set of its own. Parts of one set would not do: their
@@ -147,14 +147,14 @@ pub enum Derivatives {
 
 /// The directions of a gather, made once and turned at random for every record.
 ///
-/// Each batch is a spherical Fibonacci set. Batches stand turned against each other by fixed random rotations, and groups of them share
-/// one Voronoi diagram, fine enough for silhouettes. There is one such pattern for records to which no lamp is near, and some of fewer
-/// directions that leave up to half of the paths to directions around lamps.
+/// A spherical Fibonacci set, dealt out to the batches in turn, and its Voronoi diagram, fine enough for silhouettes: a diagram of each
+/// batch's own was not (docs/derivatives.md). There is one such set for records to which no lamp is near, and some of fewer directions
+/// that leave up to half of the paths to directions around lamps.
 #[derive(Debug)]
 pub struct GatherPattern {
     /// Paths of one batch.
     paths: usize,
-    /// Batches of a group.
+    /// Batches that share a diagram; all of them but for huge numbers of paths.
     group: usize,
     sets: [OnceLock<PatternSet>; LAMP_LEVELS],
 }
@@ -200,15 +200,10 @@ impl GatherPattern {
     fn set(&self, eighths: usize) -> &PatternSet {
         self.sets[eighths].get_or_init(|| {
             let n = self.paths - self.around_lamps(eighths);
+            let all = SphericalFibonacci::new((n * self.group) as u32, [0.0; 3]);
             let directions: Vec<Vec3> = (0..self.group)
                 .flat_map(|member| {
-                    let key = Key {
-                        seed: 0,
-                        purpose: Purpose::Record,
-                        index: member as u64,
-                    };
-                    let u = random_rotation(&mut Sampler::new(key, 0));
-                    SphericalFibonacci::new(n as u32, u).iter()
+                    (0..n).map(move |i| all.direction((i * self.group + member) as u32))
                 })
                 .collect();
             PatternSet {
