@@ -126,7 +126,7 @@ pub(crate) struct ProbeArgs {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) integrator: IntegratorArg,
-    /// Whether the gradients of a record know of moving silhouettes.
+    /// Whether gradients know of moving silhouettes; those of --integrator path always do.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) derivatives: DerivativesArg,
     #[command(flatten)]

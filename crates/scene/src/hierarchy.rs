@@ -37,7 +37,7 @@ pub struct Met {
     pub position: Vec3,
     /// Unit normal of the side on which the corners wind counter-clockwise.
     pub front_normal: Vec3,
-    /// Bound on the length of its sides, in metres.
+    /// Its longest side in metres, for needles up to 32 times as much (see [`SurfaceHit::size`](tyndall_transport::SurfaceHit)).
     pub size: f32,
 }
 
@@ -173,17 +173,17 @@ pub(crate) fn geometric_normal(corners: [Vec3; 3]) -> Vec3 {
     (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3()
 }
 
-/// What rounding of a hit is in proportion to: the longest side of a triangle, for a needle as many times as the side is longer
-/// than the triangle is wide. No more than 64 times: a step off the surface must stay far below the needle's own width.
+/// What rounding of a hit is in proportion to: the longest side of a triangle, for a needle half as many times as the side is longer
+/// than the triangle is wide. No more than 32 times: a step off the surface must stay far below the needle's own width.
 fn hit_size(corners: [Vec3; 3]) -> f32 {
-    const SLENDEREST: f32 = 64.0;
+    const SLENDEREST: f32 = 32.0;
     let [a, b, c] = corners;
     let longest = (b - a)
         .length_squared()
         .max((c - b).length_squared())
         .max((a - c).length_squared());
     let double_area = (b - a).cross(c - a).length().max(f32::MIN_POSITIVE);
-    longest.sqrt() * (longest / double_area).clamp(1.0, SLENDEREST)
+    longest.sqrt() * (0.5 * longest / double_area).clamp(1.0, SLENDEREST)
 }
 
 /// The three steps of `obvhs`'s `build_cwbvh` with its `medium_build` preset, without its debug check, whose tolerance is an

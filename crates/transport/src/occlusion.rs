@@ -14,6 +14,9 @@ const COPLANAR: f32 = 1e-3;
 /// A small piece of surface hides what is farther than it by this factor, where the pieces that it may continue in are not known.
 const APART: f32 = 1.5;
 
+/// Planes seen at a smaller cosine are taken to be seen at this one.
+const COS_MIN: f32 = 1e-3;
+
 /// Just short of a surface.
 const BARELY: f32 = 1.0 - 1e-5;
 
@@ -95,8 +98,15 @@ struct Silhouette<'s> {
 }
 
 /// One over the distance at which the plane of `hit` is seen from `x` in direction `w`: linear in `w`, not positive where it is not seen.
+///
+/// A plane that `x` lies in, or nearly, is taken to pass at [`COS_MIN`] of the hit's distance: seen edge on it has no depth.
 fn inverse_depth(hit: &Hit, x: Vec3, w: Vec3) -> f32 {
-    w.dot(hit.normal) / (hit.position - x).dot(hit.normal)
+    // Negative: normals stand on the side of `x`.
+    let height = (hit.position - x)
+        .dot(hit.normal)
+        .min(-COS_MIN * hit.t)
+        .min(-f32::MIN_POSITIVE);
+    w.dot(hit.normal) / height
 }
 
 /// Whether the surface that `near` met ends before `far`, as seen from `x`; `w` is the direction of their border.
@@ -165,7 +175,8 @@ pub(crate) fn gradient(
             },
         };
         let hidden = found.far.hidden(found.inverse_depth);
-        if hidden == Vec3::ZERO {
+        // A hit at no distance hides and shows nothing that could be told apart.
+        if hidden == Vec3::ZERO || !hidden.is_finite() {
             continue;
         }
         // The field of an edge falls as one over its scale.

@@ -8,7 +8,8 @@
 //! Where scattering is not isotropic the directions at a vertex turn when its neighbours move otherwise than itself, and
 //! ∂ ln p(μ) joins the sum; towards the eye the direction stays.
 //!
-//! Left out, so that gradients miss them: shadow edges (visibility is taken as constant), boundaries of media nearer than the
+//! Left out, so that gradients miss them: moving shadows (visibility is taken as constant; what hides from
+//! the gather point itself is added by [`crate::occlusion`]), boundaries of media nearer than the
 //! ball's least radius, the turning lobes of surfaces that are not Lambertian and of spot lights, and, for light that media
 //! emit, density profiles of an emission unlike the scattering's.
 //!
@@ -23,7 +24,7 @@ use tyndall_math::Ray;
 use tyndall_media::Media;
 
 /// Cosines on surfaces are kept above this in ∂ ln cosθ, which diverges at grazing incidence.
-pub(crate) const COS_MIN: f32 = 1e-3;
+const COS_MIN: f32 = 1e-3;
 
 /// An end of a path segment: where it is, how it moves, and the normal where it lies on a surface.
 #[derive(Clone, Copy)]

@@ -31,8 +31,8 @@ pub struct SurfaceHit {
     pub emission: Vec3,
     /// Index of the light this surface belongs to, where it emits.
     pub light: Option<usize>,
-    /// Extent in metres of the flat piece of surface hit, or of a curved one: with the position it bounds the rounding of hits
-    /// (see [`offset_origin`]).
+    /// Extent in metres of the flat piece of surface hit, or of a curved one, and more for needles: with the position it bounds the
+    /// rounding of hits (see [`offset_origin`]).
     pub size: f32,
 }
 

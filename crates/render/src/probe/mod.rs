@@ -28,7 +28,7 @@ pub struct ProbeOptions {
     pub samples: u32,
     /// How multiple scattering is found.
     pub integrator: Integrator,
-    /// Whether gradients of a record know of moving silhouettes.
+    /// Whether gradients know of moving silhouettes; differences of paths always do.
     pub derivatives: Derivatives,
     /// Seed of the random numbers.
     pub seed: u64,

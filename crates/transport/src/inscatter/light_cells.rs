@@ -4,7 +4,8 @@
 //! drawn directions reach beyond the light; what lies there must not count, so borders are cut at the light's outline.
 //!
 //! A silhouette within half a cell of the outline may go unseen: of N directions, that is about N^−½ of all places where it can be.
-//! Lights too small to tell directions apart, and emitters that are no lights, are taken to have none.
+//! Lights too small to tell directions apart, emitters that are no lights, and skies and images infinitely far away, whose cells have no
+//! outline to be cut at, are taken to have none.
 
 use super::point::Draw;
 use crate::occlusion::{self, Seen};
@@ -18,14 +19,12 @@ pub(super) struct SeenLight {
     pub(super) seen: Seen,
     /// Density of the direction, per steradian.
     pub(super) pdf: f32,
-    /// Whether the light is infinitely far away.
-    pub(super) far: bool,
 }
 
 /// The cells of one light.
 pub(super) struct LightCells {
     seen: Vec<Seen>,
-    /// Estimate of the light's solid angle; that of light from far away is taken for the whole sphere.
+    /// Estimate of the light's solid angle.
     solid_angle: f32,
 }
 
@@ -33,15 +32,10 @@ impl LightCells {
     /// From all directions drawn towards one light.
     pub(super) fn new(draws: &[Draw]) -> Self {
         let lit = || draws.iter().filter_map(|draw| draw.seen.as_ref());
-        let far = lit().any(|light| light.far);
         let sum: f32 = lit().map(|light| 1.0 / light.pdf).sum();
         Self {
             seen: lit().map(|light| light.seen.clone()).collect(),
-            solid_angle: if far {
-                2.0 * TAU
-            } else {
-                sum / draws.len() as f32
-            },
+            solid_angle: sum / draws.len() as f32,
         }
     }
 

@@ -9,7 +9,7 @@
 //! * H – cosθ′/r² for a point of a surface, 1/r² for a lamp without extent (L is its intensity), 1 for light from far away.
 //!
 //! Emitters stay where they are while x moves; light from far away moves with it. Shadows that move are in the gradient where
-//! [`Derivatives::Aware`] asks for them ([`silhouettes`](self) of what stands before lights with extent), never in the Hessian. Lamps
+//! [`Derivatives::Aware`] asks for them (silhouettes of what stands before lights with extent at a finite distance), never in the Hessian. Lamps
 //! without extent have hard shadows, which no derivative at a point knows of.
 
 mod light_cells;
@@ -24,6 +24,10 @@ use glam::{DMat3, Vec3};
 use point::{Draw, Sample};
 use tyndall_math::Key;
 use tyndall_math::stats::Welford;
+
+/// Emitters are taken to be seen at no smaller cosine than this where a logarithmic derivative divides by it: what is seen more edge-on
+/// than f32 directions can tell.
+const GRAZING: f32 = 1e-6;
 
 /// Up to which derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,7 +61,8 @@ const BATCHES: usize = 32;
 
 /// Light scattered once at `x` towards `towards` (weighting all directions alike where `None`), from `samples` samples.
 ///
-/// Value and errors do not depend on `order` and `derivatives`. The Hessian has shadows stay; it leaves out that the limb of a
+/// Value and its error do not depend on `order` and `derivatives`. The Hessian has shadows stay; it leaves out what kinks in density and in
+/// the outline of boxes add (the gradient jumps there), that the limb of a
 /// curved emitter moves (emitters made of flat pieces have none), and second derivatives of the shares in which
 /// media of different phase functions and changing densities mix.
 pub fn single<G: Geometry, L: Lights>(

@@ -1,11 +1,11 @@
 //! A point at which light is scattered, and samples of the light that comes there straight from emitters.
 
+use super::GRAZING;
 use super::light_cells::{LightCells, SeenLight};
 use super::{Order, second_order};
 use crate::light_choice::LightChoice;
 use crate::occlusion::Seen;
 use crate::single::{shadow_ray, unoccluded};
-use crate::warp_translation::COS_MIN;
 use crate::world::{Geometry, LightSample, Lights, World};
 use glam::{DMat3, Vec3};
 use smallvec::SmallVec;
@@ -265,15 +265,19 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
             });
             2.0 * way.w_i / r + falloff
         } else {
-            let cosine = (-way.normal.dot(way.w_i)).max(COS_MIN);
+            let cosine = (-way.normal.dot(way.w_i)).max(GRAZING);
             3.0 * way.w_i / r + way.normal / (r * cosine)
         };
         tau.d_a.map(|d| geometry - d)
     }
 
-    /// What is seen towards `light`, whose transmittance is `arrives`; `None` for lamps without extent.
+    /// What is seen towards `light`, whose transmittance is `arrives`; `None` for lamps without extent and for light from far away.
     fn seen(&self, light: &LightSample, arrives: Option<Vec3>) -> Option<SeenLight> {
-        if light.delta || !light.radiance.is_finite() || light.radiance == Vec3::ZERO {
+        if light.delta
+            || light.distance.is_infinite()
+            || !light.radiance.is_finite()
+            || light.radiance == Vec3::ZERO
+        {
             return None;
         }
         let seen = match arrives {
@@ -287,7 +291,6 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
         Some(SeenLight {
             seen,
             pdf: light.pdf,
-            far: light.distance.is_infinite(),
         })
     }
 

@@ -1,7 +1,7 @@
 //! The second derivatives of one sample: its formula, written in jets.
 
+use super::GRAZING;
 use super::point::Inscatter;
-use crate::warp_translation::COS_MIN;
 use crate::world::{Geometry, LightSample, Lights};
 use glam::{DMat3, DVec3};
 use tyndall_math::Jet;
@@ -41,7 +41,7 @@ pub(super) fn hessian<G: Geometry, L: Lights>(
             closer * closer * (ln_intensity - ln_intensity.value).exp()
         } else {
             let normal = way.normal.as_dvec3();
-            let cosine = (-normal.dot(w_i)).max(COS_MIN.into());
+            let cosine = (-normal.dot(w_i)).max(GRAZING.into());
             closer * closer * closer * Jet::linear(1.0, normal / (r0 * cosine))
         };
         let tau = media.optical_depth_jet(emitter, x);

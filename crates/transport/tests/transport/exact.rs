@@ -341,7 +341,7 @@ fn check_record(
             purpose: Purpose::Record,
             index: i,
         };
-        let g = gather::multiple(world, x, &GatherPattern::new(512), None, key);
+        let g = gather::multiple(world, x, &GatherPattern::new(1024), None, key);
         let n = x.normalize();
         let side = n.any_orthonormal_vector();
         values.add(g.value);
