@@ -16,6 +16,22 @@ pub struct Image {
     pub pixels: Vec<Vec3>,
 }
 
+/// Mean of the three colour channels together of a rendered `layer`, or of the beauty where it is empty.
+pub fn mean(image: &tyndall_render::image::Image, layer: &str) -> f64 {
+    let prefix = if layer.is_empty() {
+        String::new()
+    } else {
+        format!("{layer}.")
+    };
+    let channels = ["R", "G", "B"].map(|c| &image.channels[&format!("{prefix}{c}")]);
+    let sum: f64 = channels
+        .iter()
+        .flat_map(|c| c.iter())
+        .map(|&x| f64::from(x))
+        .sum();
+    sum / (3 * channels[0].len()) as f64
+}
+
 /// The channels of an EXR file by name, and its width and height.
 pub struct Channels {
     /// Width and height in pixels.

@@ -8,6 +8,7 @@
 use tyndall_math::stats::Welford;
 use tyndall_render::options::{Integrator, RenderOptions};
 use tyndall_scene::LoadOptions;
+use tyndall_tests::image;
 use tyndall_tests::program::workspace;
 
 const SEEDS: u64 = 6;
@@ -35,14 +36,7 @@ fn means(
         };
         let outcome = tyndall_render::render(scene, &options, &()).unwrap();
         for (mean, layer) in means.iter_mut().zip(layers) {
-            let channels =
-                ["R", "G", "B"].map(|c| &outcome.image.channels[&format!("{layer}.{c}")]);
-            let sum: f64 = channels
-                .iter()
-                .flat_map(|c| c.iter())
-                .map(|&x| f64::from(x))
-                .sum();
-            mean.push(sum / (3 * channels[0].len()) as f64);
+            mean.push(image::mean(&outcome.image, layer));
         }
     }
     means

@@ -9,6 +9,7 @@ use std::path::Path;
 use tyndall_math::stats::Welford;
 use tyndall_render::options::{Integrator, RenderOptions};
 use tyndall_scene::LoadOptions;
+use tyndall_tests::image;
 
 const FURNACE: &str = "Scene(
     camera: LookAt(eye: (0.0, 0.0, 3.0), target: (0.0, 0.0, 0.0), vfov: 30.0),
@@ -29,14 +30,7 @@ fn furnace(integrator: Integrator, spp: u32) -> Welford {
             ..RenderOptions::default()
         };
         let outcome = tyndall_render::render(&scene, &options, &()).unwrap();
-        let (mut sum, mut n) = (0.0, 0.0);
-        for channel in ["R", "G", "B"] {
-            for &x in &outcome.image.channels[channel] {
-                sum += f64::from(x);
-                n += 1.0;
-            }
-        }
-        means.push(sum / n);
+        means.push(image::mean(&outcome.image, ""));
     }
     means
 }

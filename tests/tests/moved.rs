@@ -6,6 +6,7 @@ use std::fs;
 use tempfile::TempDir;
 use tyndall_render::options::{Integrator, RenderOptions};
 use tyndall_scene::LoadOptions;
+use tyndall_tests::image;
 use tyndall_tests::program::workspace;
 
 /// Means of the layers of the shipped Cornell box, enlarged by `scale` and then moved by `shift` metres.
@@ -50,16 +51,8 @@ fn means(integrator: Integrator, scale: f32, shift: [f32; 3]) -> [f64; 3] {
         height: Some(32),
         ..RenderOptions::default()
     };
-    let image = tyndall_render::render(&scene, &options, &()).unwrap().image;
-    ["surface", "single", "multiple"].map(|layer| {
-        let values = ["R", "G", "B"].map(|c| &image.channels[&format!("{layer}.{c}")]);
-        let sum: f64 = values
-            .iter()
-            .flat_map(|v| v.iter())
-            .map(|&x| f64::from(x))
-            .sum();
-        sum / (3 * values[0].len()) as f64
-    })
+    let rendered = tyndall_render::render(&scene, &options, &()).unwrap().image;
+    ["surface", "single", "multiple"].map(|layer| image::mean(&rendered, layer))
 }
 
 /// The same random numbers make the same paths but where rounding turns a decision around: means differ by far less than

@@ -68,7 +68,7 @@ pub use medium::{MAX_SIGMA_T, MIN_SCALE_HEIGHT, Medium, MediumError, MediumParam
 pub use phase::{Asymmetry, AsymmetryError, HenyeyGreenstein, PhaseFunction};
 pub use point::{MediumPoint, PhaseValue};
 pub use region::Region;
-pub use segment::{Segment, transmittance};
+pub use segment::{Segment, absorptance, transmittance};
 
 /// Compiles and runs the example of the README.
 #[cfg(doctest)]

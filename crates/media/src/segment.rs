@@ -78,13 +78,25 @@ pub(crate) fn depth(sigma_t: Vec3, column: f64) -> Vec3 {
     }
 }
 
-/// exp(−τ) for each channel; one exponential where the channels are alike, as in grey fog.
+/// exp(−τ) for each channel.
 #[inline]
 pub fn transmittance(tau: Vec3) -> Vec3 {
+    each_channel(tau, |tau| (-tau).exp())
+}
+
+/// 1 − exp(−τ) for each channel, with its digits in thin media too.
+#[inline]
+pub fn absorptance(tau: Vec3) -> Vec3 {
+    each_channel(tau, |tau| -(-tau).exp_m1())
+}
+
+/// `f` of each channel, computed once where the channels are alike, as in grey fog.
+#[inline]
+fn each_channel(tau: Vec3, f: impl Fn(f32) -> f32) -> Vec3 {
     if tau.x == tau.y && tau.y == tau.z {
-        Vec3::splat((-tau.x).exp())
+        Vec3::splat(f(tau.x))
     } else {
-        tau.map(|tau| (-tau).exp())
+        tau.map(f)
     }
 }
 

@@ -3,7 +3,7 @@
 //! Distances follow transmittance, and are spread evenly as well where the segment is finite, because a medium may emit
 //! without attenuating.
 
-use crate::free_flight::FreeFlight;
+use crate::free_flight::{FreeFlight, Stop};
 use crate::world::World;
 use glam::Vec3;
 use tyndall_math::Ray;
@@ -30,14 +30,15 @@ pub fn sample<'m, G, L>(
     if !world.media.emits() {
         return None;
     }
-    let (t, pdf) = distance(flight, u)?;
+    let (stop, pdf) = distance(flight, u)?;
+    let t = stop.t;
     let medium = world.media.at(ray.at(t));
-    let value = flight.stop(t).transmittance * medium.emission / pdf;
+    let value = stop.transmittance * medium.emission / pdf;
     (value.is_finite() && value != Vec3::ZERO).then_some(EmissionSample { t, value, medium })
 }
 
 /// A distance and its density per metre.
-fn distance(flight: &FreeFlight<'_>, u: f32) -> Option<(f32, f32)> {
+fn distance(flight: &FreeFlight<'_>, u: f32) -> Option<(Stop, f32)> {
     let (start, end) = flight.segment().range();
     let even = 1.0 / (end - start);
     let share = match (even > 0.0 && even.is_finite(), flight.can_stop()) {
@@ -51,14 +52,15 @@ fn distance(flight: &FreeFlight<'_>, u: f32) -> Option<(f32, f32)> {
     } else {
         flight.sample_inside((u - share) / (1.0 - share))?
     };
+    let stop = flight.stop(t);
     let mut pdf = (1.0 - share)
         * if share < 1.0 {
-            flight.pdf_inside(&flight.stop(t))
+            flight.pdf_inside(&stop)
         } else {
             0.0
         };
     if share > 0.0 {
         pdf += share * even;
     }
-    Some((t, pdf))
+    Some((stop, pdf))
 }

@@ -4,7 +4,7 @@
 //! importance sampling, Wilkie et al. 2014), so coloured extinction costs no variance in the channels not picked.
 
 use glam::Vec3;
-use tyndall_media::{Segment, transmittance};
+use tyndall_media::{Segment, absorptance, transmittance};
 
 /// Samples scattering distances on a [`Segment`] in proportion to σt T.
 #[derive(Clone, Debug)]
@@ -41,12 +41,7 @@ impl<'m> FreeFlight<'m> {
             total,
             weights,
             inside_weights: if sum > 0.0 { inside / sum } else { Vec3::ZERO },
-            // 1 − T by expm1 keeps its digits in thin media.
-            stopped: if total.x == total.y && total.y == total.z {
-                Vec3::splat(-(-total.x).exp_m1())
-            } else {
-                total.map(|tau| -(-tau).exp_m1())
-            },
+            stopped: absorptance(total),
             segment,
         }
     }

@@ -11,7 +11,7 @@ use crate::world::{Geometry, Lights, World};
 use glam::{Quat, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::OnceLock;
-use tyndall_math::spherical::SphericalVoronoi;
+use tyndall_math::spherical::{Border, SphericalVoronoi};
 use tyndall_math::{Key, Ray, Sampler, SphericalFibonacci, warp};
 use tyndall_media::MediumPoint;
 
@@ -160,11 +160,19 @@ pub struct GatherPattern {
     sets: [OnceLock<PatternSet>; LAMP_LEVELS],
 }
 
-/// Directions of one group, batch by batch, and the cells that all of them make.
+/// Directions of one group, batch by batch, and the cells that all of them make, once silhouettes ask for them.
 #[derive(Debug)]
 struct PatternSet {
     directions: Vec<Vec3>,
-    cells: SphericalVoronoi,
+    cells: OnceLock<SphericalVoronoi>,
+}
+
+impl PatternSet {
+    fn borders(&self) -> &[Border] {
+        self.cells
+            .get_or_init(|| SphericalVoronoi::new(&self.directions))
+            .borders()
+    }
 }
 
 /// Parts by which shares of lamp directions are counted, rounded up.
@@ -212,8 +220,8 @@ impl GatherPattern {
                 })
                 .collect();
             PatternSet {
-                cells: SphericalVoronoi::new(&directions),
                 directions,
+                cells: OnceLock::new(),
             }
         })
     }
@@ -328,7 +336,7 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
             batches.add_to_gradient(batch, moved.map(|m| m * pattern.group as f32));
         };
         match &directions.lobe {
-            None => occlusion::gradient(set.cells.borders(), turn(group), x, &seen, phase, add),
+            None => occlusion::gradient(set.borders(), turn(group), x, &seen, phase, add),
             // Directions drawn by a phase function make cells of their own.
             Some(_) => {
                 let drawn: Vec<Vec3> = seen.iter().map(|s| s.direction).collect();

@@ -48,9 +48,6 @@
 //!         Equiangular::new(ray, Vec3::ZERO, 0.0, t_max).angle_over_distance()
 //!     }
 //!     fn distance_to_point_lights(&self, p: Vec3) -> f32 { p.length() }
-//!     // No sky.
-//!     fn environment(&self) -> &[usize] { &[] }
-//!     fn environment_radiance(&self, _: usize, _: Vec3) -> Vec3 { Vec3::ZERO }
 //! }
 //!
 //! let fog = Medium::new(MediumParams::new(Vec3::ONE, Vec3::splat(0.8)))?;

@@ -66,11 +66,15 @@ pub trait Lights: Sync {
     /// light; 0 for lights without extent.
     fn pdf(&self, light: usize, p: Vec3, w_i: Vec3) -> f32;
 
-    /// The lights that rays which leave the scene meet: skies and environment images.
-    fn environment(&self) -> &[usize];
+    /// The lights that rays which leave the scene meet: skies and environment images; none unless told.
+    fn environment(&self) -> &[usize] {
+        &[]
+    }
 
     /// Radiance that arrives from direction `w_i` (pointing away from the scene) out of environment light `light`.
-    fn environment_radiance(&self, light: usize, w_i: Vec3) -> Vec3;
+    fn environment_radiance(&self, _light: usize, _w_i: Vec3) -> Vec3 {
+        Vec3::ZERO
+    }
 
     /// ln I with its derivatives per metre, up to a constant, where the intensity that `light` sends to `p` depends on the
     /// direction it leaves in (a spot's falloff); zero for other lights.

@@ -47,6 +47,15 @@ fn outer(u: DVec3, v: DVec3) -> DMat3 {
     DMat3::from_cols(u * v.x, u * v.y, u * v.z)
 }
 
+/// Solid angle of the spherical triangle of three unit vectors, positive where they wind counter-clockwise from outside.
+///
+/// Van Oosterom and Strackee 1983, "The Solid Angle of a Plane Triangle", equation 8.
+pub fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+    2.0 * a
+        .dot(b.cross(c))
+        .atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
+}
+
 /// Gradient at `x` of the solid angle of a flat polygon with `corners` (metres), counter-clockwise as seen from `x`.
 pub fn solid_angle_gradient(x: DVec3, corners: &[DVec3]) -> DVec3 {
     edges(x, corners).map(|(a, b)| edge(a, b)).sum()

@@ -8,7 +8,7 @@ mod rectangle;
 mod triangle;
 mod voronoi;
 
-pub use edge::{edge, edge_jacobian, solid_angle_gradient, solid_angle_hessian};
+pub use edge::{edge, edge_jacobian, solid_angle, solid_angle_gradient, solid_angle_hessian};
 pub use rectangle::{RectangleSample, SphericalRectangle};
 pub use triangle::{SphericalTriangle, TriangleSample};
 pub use voronoi::{Border, SphericalVoronoi};

@@ -121,6 +121,7 @@ impl Frame {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spherical::solid_angle;
     use crate::{Key, Purpose, Sampler, SphericalFibonacci, warp};
 
     fn random(n: u64, seed: u64, share: f32) -> Vec<Vec3> {
@@ -137,20 +138,14 @@ mod tests {
             .collect()
     }
 
-    /// Solid angle of the triangle of three directions, positive where they wind counter-clockwise from outside.
-    /// Van Oosterom and Strackee 1983.
-    fn triangle([a, b, c]: [DVec3; 3]) -> f64 {
-        2.0 * a
-            .dot(b.cross(c))
-            .atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
-    }
-
     fn areas(directions: &[Vec3]) -> Vec<f64> {
         let mut areas = vec![0.0; directions.len()];
         for Border { cells, ends } in SphericalVoronoi::new(directions).borders() {
             let [a, b] = ends.map(|e| e.as_dvec3());
-            areas[cells[0] as usize] += triangle([directions[cells[0] as usize].as_dvec3(), a, b]);
-            areas[cells[1] as usize] += triangle([directions[cells[1] as usize].as_dvec3(), b, a]);
+            areas[cells[0] as usize] +=
+                solid_angle([directions[cells[0] as usize].as_dvec3(), a, b]);
+            areas[cells[1] as usize] +=
+                solid_angle([directions[cells[1] as usize].as_dvec3(), b, a]);
         }
         areas
     }

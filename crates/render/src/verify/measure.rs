@@ -151,9 +151,11 @@ pub(super) fn point_rows(
     let across = along.any_orthonormal_vector();
     let run = |budget: &Budget| {
         let mut spread = [Welford::new(); 3];
+        let rays = budget.samples(rays);
+        let pattern = GatherPattern::new(rays);
         for replicate in 0..RECORDS {
-            let rays = budget.samples(rays);
-            let (value, gradient) = measure(world, budget.key(replicate), rays, point);
+            let key = budget.key(replicate);
+            let (value, gradient) = measure(world, key, (rays, &pattern), point);
             let gradient = glam::DVec3::from(gradient);
             let numbers = [value, gradient.dot(along), gradient.dot(across)];
             for (spread, number) in spread.iter_mut().zip(numbers) {
@@ -195,7 +197,12 @@ pub(super) fn point_rows(
 }
 
 /// Value and gradient at `point`, means of the colour channels.
-fn measure(world: &World<'_>, key: Key, rays: usize, point: &Point) -> (f64, [f64; 3]) {
+fn measure(
+    world: &World<'_>,
+    key: Key,
+    (rays, pattern): (usize, &GatherPattern),
+    point: &Point,
+) -> (f64, [f64; 3]) {
     let (mut value, mut gradient) = (0.0, [0.0; 3]);
     let mut add = |part: Vec3, slopes: [Vec3; 3]| {
         value += Channel::Mean.of(part);
@@ -204,12 +211,11 @@ fn measure(world: &World<'_>, key: Key, rays: usize, point: &Point) -> (f64, [f6
         }
     };
     if point.light != Light::Single {
-        let pattern = GatherPattern::new(rays);
         let g = gather::multiple_towards(
             world,
             point.x,
             point.towards,
-            &pattern,
+            pattern,
             Derivatives::Aware,
             None,
             key,

@@ -11,7 +11,7 @@ use super::point::Draw;
 use crate::occlusion::{self, Seen};
 use glam::{DMat3, DVec3, Quat, Vec3};
 use std::f32::consts::TAU;
-use tyndall_math::spherical::{Border, SphericalVoronoi};
+use tyndall_math::spherical::{Border, SphericalVoronoi, solid_angle};
 
 /// What is seen in a direction drawn towards a light.
 #[derive(Clone, Debug)]
@@ -146,7 +146,7 @@ struct Outline {
 }
 
 impl Outline {
-    fn new(directions: &[Vec3], arcs: &[Arc], solid_angle: f32) -> Self {
+    fn new(directions: &[Vec3], arcs: &[Arc], of_light: f32) -> Self {
         let center: DVec3 = directions.iter().map(|d| d.as_dvec3()).sum();
         let mut outline = Self {
             sides: Vec::new(),
@@ -158,12 +158,12 @@ impl Outline {
             if ends[0].is_some() != ends[1].is_some() {
                 let [a, b] = cells.map(|c| directions[c as usize].as_dvec3());
                 outline.sides.extend(outline.side(a, b));
-                area += triangle([outline.center, a, b]).abs();
+                area += solid_angle([outline.center, a, b]).abs();
                 perimeter += a.distance(b);
             }
         }
         if perimeter > 0.0 {
-            outline.gap = ((f64::from(solid_angle) - area) / perimeter).clamp(0.0, 1.0);
+            outline.gap = ((f64::from(of_light) - area) / perimeter).clamp(0.0, 1.0);
         }
         outline
     }
@@ -199,12 +199,4 @@ impl Outline {
         }
         (t0 < t1).then(|| [t0, t1].map(|t| a.lerp(b, t).normalize_or_zero()))
     }
-}
-
-/// Solid angle of the triangle of three directions, positive where they wind counter-clockwise from outside.
-/// Van Oosterom and Strackee 1983.
-fn triangle([a, b, c]: [DVec3; 3]) -> f64 {
-    2.0 * a
-        .dot(b.cross(c))
-        .atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
 }

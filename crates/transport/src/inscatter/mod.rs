@@ -62,9 +62,8 @@ const BATCHES: usize = 32;
 /// Light scattered once at `x` towards `towards` (weighting all directions alike where `None`), from `samples` samples.
 ///
 /// Value and its error do not depend on `order` and `derivatives`. The Hessian has shadows stay; it leaves out what kinks in density and in
-/// the outline of boxes add (the gradient jumps there), that the limb of a
-/// curved emitter moves (emitters made of flat pieces have none), and second derivatives of the shares in which
-/// media of different phase functions and changing densities mix.
+/// the outline of boxes add (the gradient jumps there), that the limb of a curved emitter moves (emitters made of flat pieces have
+/// none), and second derivatives of the shares in which media of different phase functions and changing densities mix.
 pub fn single<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,

@@ -248,7 +248,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
 
     /// ∇ ln(T H): H = cosθ/r² for a point of a surface, I/r² for a lamp without extent, 1 for light from far away.
     ///
-    /// At grazing incidence, cosθ below 1e-3, its gradient is bounded.
+    /// At grazing incidence, cosθ below [`GRAZING`], its gradient is bounded.
     fn way_log_gradient(&self, way: &LightSample, light: Option<usize>) -> [Vec3; 3] {
         let media = self.world.media;
         if way.distance.is_infinite() {

@@ -16,7 +16,7 @@ use tyndall_media::PhaseValue;
 ///
 /// H = I(v/r)/r² for lamps without extent; light from far away keeps its direction, with H = 1, while τ is that of a ray
 /// that moves with x. Product rule as in Jarosz, Donner, Zwicker and Jensen 2008, carried to second order by [`Jet`]s in f64.
-/// At grazing incidence, cosθ′ below 1e-3, the derivatives of n′·v are bounded. Checked against the closed forms of E2b.
+/// At grazing incidence, cosθ′ below [`GRAZING`], the derivatives of n′·v are bounded. Checked against the closed forms of E2b.
 pub(super) fn hessian<G: Geometry, L: Lights>(
     point: &Inscatter<'_, '_, G, L>,
     way: &LightSample,

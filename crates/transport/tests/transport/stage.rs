@@ -203,14 +203,6 @@ impl Lights for Stage {
         }
     }
 
-    fn environment(&self) -> &[usize] {
-        &[]
-    }
-
-    fn environment_radiance(&self, _light: usize, _w_i: Vec3) -> Vec3 {
-        Vec3::ZERO
-    }
-
     fn distance_to_point_lights(&self, p: Vec3) -> f32 {
         let distance = |lamp: &Lamp| match lamp {
             Lamp::Point { position, .. } => position.distance(p),

@@ -264,14 +264,6 @@ impl Lights for Source {
         0.0
     }
 
-    fn environment(&self) -> &[usize] {
-        &[]
-    }
-
-    fn environment_radiance(&self, _light: usize, _w_i: Vec3) -> Vec3 {
-        Vec3::ZERO
-    }
-
     fn distance_to_point_lights(&self, p: Vec3) -> f32 {
         self.pivot(0).map_or(f32::INFINITY, |lamp| lamp.distance(p))
     }

@@ -191,14 +191,6 @@ impl Lights for Floodlight {
         0.0
     }
 
-    fn environment(&self) -> &[usize] {
-        &[]
-    }
-
-    fn environment_radiance(&self, _light: usize, _w_i: Vec3) -> Vec3 {
-        Vec3::ZERO
-    }
-
     fn distance_to_point_lights(&self, _p: Vec3) -> f32 {
         f32::INFINITY
     }
