@@ -72,6 +72,7 @@
 //! A path draws its numbers from a [`Sampler`](tyndall_math::Sampler), that is from a key; nothing else is random. Nothing here
 //! starts a thread, keeps state, or prints.
 
+pub mod batches;
 pub mod bsdf;
 pub mod emission;
 pub mod free_flight;

@@ -49,9 +49,11 @@ fn part_lines(name: &str, part: &Part) -> Vec<String> {
             triple(part.gradient_stderr[c])
         ));
     }
-    for (channel, rows) in channels.iter().zip(part.hessian.iter().flatten()) {
-        let rows = rows.map(triple).join(" ");
-        lines.push(format!("  Hessian of {channel:<7} {rows} /m²"));
+    let hessians = part.hessian.iter().flatten();
+    let errors = part.hessian_stderr.iter().flatten();
+    for (channel, (hessian, error)) in channels.iter().zip(hessians.zip(errors)) {
+        let [hessian, error] = [hessian, error].map(|rows| rows.map(triple).join(" "));
+        lines.push(format!("  Hessian of {channel:<7} {hessian} ± {error} /m²"));
     }
     lines
 }

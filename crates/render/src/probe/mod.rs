@@ -9,7 +9,7 @@ pub use paths::by_paths;
 pub use tyndall_transport::gather::Derivatives;
 
 use crate::options::Integrator;
-use glam::Vec3;
+use glam::{DMat3, Vec3};
 use serde::Serialize;
 use tyndall_math::{Key, Purpose};
 use tyndall_scene::Scene;
@@ -80,16 +80,21 @@ pub struct Part {
     /// Second derivatives per square metre, 3 × 3 for red, green and blue, where they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hessian: Option<[[[f64; 3]; 3]; 3]>,
+    /// Standard error of the Hessian.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hessian_stderr: Option<[[[f64; 3]; 3]; 3]>,
 }
 
 impl From<Inscattered> for Part {
     fn from(found: Inscattered) -> Self {
+        let rows = |hessian: [DMat3; 3]| hessian.map(|h| h.to_cols_array_2d());
         Self {
             value: found.value.into(),
             stderr: found.value_error.into(),
             gradient: found.gradient.map(Into::into),
             gradient_stderr: found.gradient_error.map(Into::into),
-            hessian: found.hessian.map(|h| h.map(|h| h.to_cols_array_2d())),
+            hessian: found.hessian.map(rows),
+            hessian_stderr: found.hessian_error.map(rows),
         }
     }
 }
@@ -161,6 +166,7 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
                 gradient: g.gradient.map(Into::into),
                 gradient_stderr: g.gradient_error.map(Into::into),
                 hessian: None,
+                hessian_stderr: None,
             };
             let asked = (Order::Hessian, options.derivatives);
             let single = inscatter::single(&world, options.at, towards, samples, asked, key);

@@ -6,6 +6,7 @@ use super::Part;
 use glam::Vec3;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Ray, Sampler};
+use tyndall_transport::batches::in_batches;
 use tyndall_transport::gather::{self, GatherDirections};
 use tyndall_transport::inscatter::Inscatter;
 use tyndall_transport::{Geometry, Lights, World};
@@ -30,24 +31,43 @@ pub fn by_paths<G: Geometry, L: Lights>(
     let here = Place::new(world, x, towards, max_depth);
     let around = Vec3::AXES
         .map(|axis| [step, -step].map(|h| Place::new(world, x + h * axis, towards, max_depth)));
-    let [single, multiple] = average(samples, key, |key, i| {
-        let value = here.sample(key, i);
-        let mut parts = value.map(|value| Sample {
-            value,
-            ..Sample::default()
-        });
-        for (axis, [ahead, behind]) in around.iter().enumerate() {
-            let (ahead, behind) = (ahead.sample(key, i), behind.sample(key, i));
-            for (part, (a, b)) in parts.iter_mut().zip(ahead.into_iter().zip(behind)) {
-                let slope = (a - b) / (2.0 * step);
-                for (c, gradient) in part.gradient.iter_mut().enumerate() {
-                    gradient[axis] = slope[c];
+    let spread = in_batches(samples, key, |key, n| {
+        let mut sums = [0.0; 2 * NUMBERS];
+        for i in 0..n as u64 {
+            let mut parts = here.sample(key, i).map(|value| [value; 4]);
+            for (axis, [ahead, behind]) in around.iter().enumerate() {
+                let (ahead, behind) = (ahead.sample(key, i), behind.sample(key, i));
+                for (part, (a, b)) in parts.iter_mut().zip(ahead.into_iter().zip(behind)) {
+                    let slope = (a - b) / (2.0 * step);
+                    for (c, gradient) in part[1..].iter_mut().enumerate() {
+                        gradient[axis] = slope[c];
+                    }
                 }
             }
+            let numbers = parts.iter().flatten().flat_map(|v| v.to_array());
+            for (sum, number) in sums.iter_mut().zip(numbers) {
+                *sum += f64::from(number);
+            }
         }
-        parts
+        sums.map(|sum| sum / n as f64)
     });
-    (single, multiple)
+    let (single, multiple) = spread.split_at(NUMBERS);
+    (part(single), part(multiple))
+}
+
+/// Of a part: the value, then its gradient by channel.
+const NUMBERS: usize = 3 + 9;
+
+fn part(spread: &[Welford]) -> Part {
+    let triple = |k: usize, f: fn(&Welford) -> f64| [0, 1, 2].map(|i| f(&spread[3 * k + i]) as f32);
+    Part {
+        value: triple(0, Welford::mean),
+        stderr: triple(0, Welford::standard_error),
+        gradient: [1, 2, 3].map(|k| triple(k, Welford::mean)),
+        gradient_stderr: [1, 2, 3].map(|k| triple(k, Welford::standard_error)),
+        hessian: None,
+        hessian_stderr: None,
+    }
 }
 
 /// The length over which light may change at `x`: to the nearest surface, lamp or boundary, or a free path; 1 m without any.
@@ -111,55 +131,4 @@ impl<'w, 'm, G: Geometry, L: Lights> Place<'w, 'm, G, L> {
         );
         [self.point.value(key, i), multiple]
     }
-}
-
-/// Independent batches from whose spread standard errors are taken; within one, samples are stratified.
-const BATCHES: usize = 32;
-
-/// Value and gradient of one sample.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sample {
-    value: Vec3,
-    gradient: [Vec3; 3],
-}
-
-/// Averages `samples` samples of several parts; `sample` is given the key of the batch and the number in it.
-fn average<const N: usize>(
-    samples: usize,
-    key: Key,
-    mut sample: impl FnMut(Key, u64) -> [Sample; N],
-) -> [Part; N] {
-    let batches = samples.clamp(1, BATCHES);
-    let mut spread = [[Welford::new(); 12]; N];
-    for batch in 0..batches {
-        let key = Key {
-            index: (key.index << 8) | batch as u64,
-            ..key
-        };
-        // Batches differ by at most one sample: samples are dealt out in turn.
-        let n = (samples - batch).div_ceil(batches).max(1);
-        let mut sums = [[0.0f64; 12]; N];
-        for i in 0..n {
-            for (sum, part) in sums.iter_mut().zip(sample(key, i as u64)) {
-                let numbers = [part.value].into_iter().chain(part.gradient);
-                for (sum, x) in sum.iter_mut().zip(numbers.flat_map(|v| v.to_array())) {
-                    *sum += f64::from(x);
-                }
-            }
-        }
-        for (spread, sum) in spread.iter_mut().flatten().zip(sums.iter().flatten()) {
-            spread.push(sum / n as f64);
-        }
-    }
-    spread.map(|numbers| {
-        let triple =
-            |i: usize, f: fn(&Welford) -> f64| [0, 1, 2].map(|c| f(&numbers[3 * i + c]) as f32);
-        Part {
-            value: triple(0, Welford::mean),
-            stderr: triple(0, Welford::standard_error),
-            gradient: [1, 2, 3].map(|i| triple(i, Welford::mean)),
-            gradient_stderr: [1, 2, 3].map(|i| triple(i, Welford::standard_error)),
-            hessian: None,
-        }
-    })
 }

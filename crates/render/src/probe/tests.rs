@@ -81,6 +81,7 @@ fn the_hessian_is_the_slope_of_the_gradient_and_told_where_it_is_known() {
     let good = options(Integrator::Cache, 64);
     let found = probe(&scene, &good).unwrap();
     assert_eq!(found.multiple.hessian, None);
+    assert!(found.single.hessian_stderr.is_some() && found.multiple.hessian_stderr.is_none());
     let path = probe(&scene, &options(Integrator::Path, 16)).unwrap();
     assert_eq!((path.single.hessian, path.multiple.hessian), (None, None));
     let h = 0.01;

@@ -18,6 +18,7 @@ mod second_order;
 
 pub use point::Inscatter;
 
+use crate::batches::in_batches;
 use crate::gather::Derivatives;
 use crate::world::{Geometry, Lights, World};
 use glam::{DMat3, Vec3};
@@ -54,10 +55,9 @@ pub struct Inscattered {
     pub value_error: Vec3,
     /// Standard error of each component of the gradient.
     pub gradient_error: [Vec3; 3],
+    /// Standard error of each entry of the Hessian, where there is one.
+    pub hessian_error: Option<[DMat3; 3]>,
 }
-
-/// Independent batches from whose spread standard errors are taken; within one, samples are stratified.
-const BATCHES: usize = 32;
 
 /// Light scattered once at `x` towards `towards` (weighting all directions alike where `None`), from `samples` samples.
 ///
@@ -74,54 +74,54 @@ pub fn single<G: Geometry, L: Lights>(
 ) -> Inscattered {
     let point = Inscatter::new(world, x, towards);
     let aware = order >= Order::Gradient && derivatives == Derivatives::Aware;
-    let batches = samples.clamp(1, BATCHES);
-    let mut spread = [[Welford::new(); 3]; 4];
-    let mut hessian = [DMat3::ZERO; 3];
-    for batch in 0..batches {
-        let key = Key {
-            index: (key.index << 8) | batch as u64,
-            ..key
-        };
-        // Batches differ by at most one sample: samples are dealt out in turn.
-        let n = (samples - batch).div_ceil(batches).max(1);
-        let mut sums = [[0.0f64; 3]; 4];
+    let spread = in_batches(samples, key, |key, n| {
+        let mut mean = [0.0; NUMBERS];
         let mut draws: Option<Vec<Draw>> = aware.then(Vec::new);
         for i in 0..n {
             let sample = point.sample(key, i as u64, order, draws.as_mut());
-            add(&mut sums, sample.numbers(), 1.0 / n as f64);
-            for (sum, h) in hessian.iter_mut().zip(sample.hessian) {
-                *sum += h * (1.0 / (n * batches) as f64);
-            }
+            add(&mut mean, &sample, order, 1.0 / n as f64);
         }
         if let Some(draws) = draws {
-            let gradient = point.silhouettes(key, n, draws);
             let moved = Sample {
-                gradient,
+                gradient: point.silhouettes(key, n, draws),
                 ..Sample::ZERO
             };
-            add(&mut sums, moved.numbers(), 1.0);
+            add(&mut mean, &moved, Order::Gradient, 1.0);
         }
-        for (spread, sum) in spread.iter_mut().flatten().zip(sums.as_flattened()) {
-            spread.push(*sum);
-        }
-    }
-    let of = |k: usize, f: fn(&Welford) -> f64| {
-        Vec3::from([0, 1, 2].map(|axis| f(&spread[k][axis]) as f32))
+        mean
+    });
+    let vector = |k: usize, f: fn(&Welford) -> f64| {
+        Vec3::from([0, 1, 2].map(|axis| f(&spread[3 * k + axis]) as f32))
+    };
+    let hessian = |f: fn(&Welford) -> f64| {
+        let matrix =
+            |c: usize| DMat3::from_cols_array(&std::array::from_fn(|k| f(&spread[12 + 9 * c + k])));
+        (order == Order::Hessian).then(|| [0, 1, 2].map(matrix))
     };
     Inscattered {
-        value: of(0, Welford::mean),
-        gradient: [1, 2, 3].map(|k| of(k, Welford::mean)),
-        hessian: (order == Order::Hessian).then_some(hessian),
-        value_error: of(0, Welford::standard_error),
-        gradient_error: [1, 2, 3].map(|k| of(k, Welford::standard_error)),
+        value: vector(0, Welford::mean),
+        gradient: [1, 2, 3].map(|k| vector(k, Welford::mean)),
+        hessian: hessian(Welford::mean),
+        value_error: vector(0, Welford::standard_error),
+        gradient_error: [1, 2, 3].map(|k| vector(k, Welford::standard_error)),
+        hessian_error: hessian(Welford::standard_error),
     }
 }
 
-/// Adds value and gradient of a sample; f64 because thousands of terms of both signs are added.
-fn add(sums: &mut [[f64; 3]; 4], numbers: [Vec3; 4], weight: f64) {
-    for (sum, v) in sums.iter_mut().zip(numbers) {
-        for (sum, number) in sum.iter_mut().zip(v.to_array()) {
-            *sum += f64::from(number) * weight;
+/// Of a sample: value, gradient and Hessian by channel.
+const NUMBERS: usize = 3 + 9 + 27;
+
+/// Adds the numbers of a sample; f64 because thousands of terms of both signs are added.
+fn add(sums: &mut [f64; NUMBERS], sample: &Sample, order: Order, weight: f64) {
+    let (slopes, curvatures) = sums.split_at_mut(12);
+    let vectors = [sample.value].into_iter().chain(sample.gradient);
+    for (sum, number) in slopes.iter_mut().zip(vectors.flat_map(|v| v.to_array())) {
+        *sum += f64::from(number) * weight;
+    }
+    if order == Order::Hessian {
+        let numbers = sample.hessian.iter().flat_map(DMat3::to_cols_array);
+        for (sum, number) in curvatures.iter_mut().zip(numbers) {
+            *sum += number * weight;
         }
     }
 }

@@ -40,12 +40,6 @@ impl Sample {
         gradient: [Vec3::ZERO; 3],
         hessian: [DMat3::ZERO; 3],
     };
-
-    /// Value, and gradient by channel.
-    pub(super) fn numbers(&self) -> [Vec3; 4] {
-        let [dr, dg, db] = self.gradient;
-        [self.value, dr, dg, db]
-    }
 }
 
 /// A direction drawn towards a light with extent, and what is seen there; `None` where the light sends nothing.
