@@ -516,3 +516,79 @@ fn check_finite(tau: &Jet, case: &impl std::fmt::Debug) {
     let transmittance = (-*tau).exp();
     assert!(transmittance.is_finite(), "{case:?}: {transmittance:?}");
 }
+
+/// On the kink of a height fog derivatives are those from above, beside it those of its side, however the line leaves.
+#[test]
+fn at_the_base_derivatives_are_those_of_one_side() {
+    let regions = [
+        Region::Everywhere,
+        // Its floor is the base.
+        Region::Box {
+            min: Vec3::new(-4.0, 0.3, -4.0),
+            max: Vec3::new(4.0, 3.0, 4.0),
+        },
+        // Its ceiling is.
+        Region::Box {
+            min: Vec3::new(-4.0, -3.0, -4.0),
+            max: Vec3::new(4.0, 0.3, 4.0),
+        },
+    ];
+    let base = 0.3_f32;
+    let heights = [
+        (base.next_down(), -1.0),
+        (base, 1.0),
+        (base.next_up(), 1.0),
+        (base + 0.5, 1.0),
+        (base - 0.5, -1.0),
+    ];
+    let mut cases = 0;
+    for region in regions {
+        let media = one(region, fog(base, 0.7), 0.6);
+        for (y, side) in heights {
+            let x = DVec3::new(0.2, y.into(), -0.1);
+            for rise in [-2.0, -0.4, -0.1, 0.0, 0.1, 0.4, 2.0] {
+                for lateral in [0.0, 0.3, 1.0] {
+                    let way = DVec3::new(lateral, rise, 0.5 * lateral);
+                    // As transport finds the point: not to the last digit.
+                    let fixed = x + way.length() * way.normalize();
+                    let on_boundary = region.distance_to_boundary(x.as_vec3()) < 0.1;
+                    if way == DVec3::ZERO || on_boundary {
+                        continue;
+                    }
+                    check_one_side(
+                        &|h| media.optical_depth_jet(fixed, x + h)[0],
+                        side,
+                        &(region, y, way),
+                    );
+                    let n = way.normalize();
+                    let rigid = |h| media.optical_depth_jet_rigid(x + h, n, way.length())[0];
+                    check_one_side(&rigid, side, &(region, y, way));
+                    cases += 2;
+                }
+            }
+        }
+    }
+    assert_eq!(cases, 360);
+}
+
+/// The Hessian is the difference of gradients, upwards or downwards to one side of a kink.
+fn check_one_side(f: &dyn Fn(DVec3) -> Jet, side: f64, case: &dyn std::fmt::Debug) {
+    let jet = f(DVec3::ZERO);
+    let h = 1e-5;
+    for (i, axis) in DVec3::AXES.into_iter().enumerate() {
+        let at = |k: f64| f(k * side * h * axis).gradient;
+        // Sideways at the same height the function is smooth; up and down the difference is one-sided, of second order.
+        let column = if i == 1 {
+            (4.0 * at(1.0) - 3.0 * at(0.0) - at(2.0)) / (2.0 * side * h)
+        } else {
+            (at(1.0) - at(-1.0)) / (2.0 * side * h)
+        };
+        // h² of fourth derivatives, some hundred; rounding over h.
+        let error = (jet.hessian.col(i) - column).length();
+        assert!(
+            error < 1e-6,
+            "{case:?} {i}: {} {column}",
+            jet.hessian.col(i)
+        );
+    }
+}

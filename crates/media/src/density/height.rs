@@ -2,6 +2,9 @@
 //!
 //! In scale heights above the base a ray climbs as s(t) = s₀ + k t, so the density exp(−max(0, s)) is elementary on either
 //! side of the base. Every form below is written from its thinner or its denser end so that nothing overflows or cancels.
+//!
+//! On the base, where the density has a kink, derivatives are those from above. A point that may lie below it by rounding alone counts
+//! as above, for the density's gradient and for whether the ray crosses the base alike: two answers would not fit together.
 
 use crate::gradient::GRAZING;
 use crate::line::Line;
@@ -15,15 +18,22 @@ pub(crate) struct HeightProfile {
     slope: f64,
     /// 1/H, per metre.
     inverse_scale_height: f64,
+    /// Of s₀, in scale heights.
+    rounding: f64,
 }
+
+/// What heights may be off by, relative to what they are the sums of: some roundings of f64, 10⁻⁷ of one of f32.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 impl HeightProfile {
     pub(crate) fn new(base: f32, scale_height: f32, line: &Line) -> Self {
         let inverse_scale_height = 1.0 / f64::from(scale_height);
+        let (y, base) = (line.origin.y, f64::from(base));
         Self {
-            start: (line.origin.y - f64::from(base)) * inverse_scale_height,
+            start: (y - base) * inverse_scale_height,
             slope: line.direction.y * inverse_scale_height,
             inverse_scale_height,
+            rounding: ROUNDING * (y.abs() + base.abs()) * inverse_scale_height,
         }
     }
 
@@ -41,26 +51,39 @@ impl HeightProfile {
         (-self.height(t).max(0.0)).exp()
     }
 
-    /// ∂ρ/∂y at `t`: −ρ/H above the base, 0 below and on it.
+    /// Whether the ray is above the base at `t`, or on it, or may be but for rounding.
+    fn is_above(&self, t: f64) -> bool {
+        let height = self.height(t);
+        let rounding = self.rounding + ROUNDING * (height - self.start).abs();
+        // Infinitely far below this is NaN, and false.
+        height + rounding >= 0.0
+    }
+
+    /// ∂ρ/∂y at `t`: −ρ/H above the base and on it, 0 below.
     pub(crate) fn vertical_gradient(&self, t: f64) -> f64 {
-        if self.height(t) > 0.0 {
+        if self.is_above(t) {
             -self.value(t) * self.inverse_scale_height
         } else {
             0.0
         }
     }
 
+    /// The distance in [`t0`, `t1`] nearest to where a ray that is not level crosses the base.
+    fn crossing(&self, t0: f64, t1: f64) -> f64 {
+        (-self.start / self.slope).max(t0).min(t1)
+    }
+
     /// The parts of [`t0`, `t1`] below and above the base; an absent part has its end at or before its start.
     fn split(&self, t0: f64, t1: f64) -> [(f64, f64); 2] {
         let nothing = (t0, t0);
         if self.slope == 0.0 {
-            return if self.start <= 0.0 {
+            return if self.start < 0.0 {
                 [(t0, t1), nothing]
             } else {
                 [nothing, (t0, t1)]
             };
         }
-        let crossing = (-self.start / self.slope).max(t0).min(t1);
+        let crossing = self.crossing(t0, t1);
         if self.slope > 0.0 {
             [(t0, crossing), (crossing, t1)]
         } else {
@@ -133,25 +156,26 @@ impl HeightProfile {
     /// ∫ tʲ ∂²ρ/∂y² dt for j = 0, 1, 2, with ∂²ρ/∂y² = ρ/H² above the base and 0 below.
     ///
     /// On the base ∂ρ/∂y falls by 1/H, which adds −tʲ/(H |∂y/∂t|) where the ray crosses it; the slope ∂y/∂t is kept above
-    /// [`GRAZING`].
+    /// [`GRAZING`]. A ray that ends on the base crosses it where it comes from below.
     pub(crate) fn hessian_moments(&self, t0: f64, t1: f64) -> [f64; 3] {
-        let [below, above] = self.split(t0, t1);
+        let [_, above] = self.split(t0, t1);
         let zeroth = self.column_above(above);
-        if zeroth == 0.0 {
-            return [0.0; 3];
+        let mut moments = [0.0; 3];
+        if zeroth > 0.0 {
+            let (end, first) = self.moment_from_denser_end(above);
+            let second = self.value(end) * moment(2, self.slope.abs(), length(above));
+            moments = [
+                zeroth,
+                end * zeroth + first,
+                end * (end * zeroth + 2.0 * first) + second,
+            ];
         }
-        let (end, first) = self.moment_from_denser_end(above);
-        let second = self.value(end) * moment(2, self.slope.abs(), length(above));
-        let mut moments = [
-            zeroth,
-            end * zeroth + first,
-            end * (end * zeroth + 2.0 * first) + second,
-        ];
-        if length(below) > 0.0 {
+        if self.is_above(t0) != self.is_above(t1) {
+            let t = self.crossing(t0, t1);
             let kink = 1.0 / self.slope.abs().max(GRAZING * self.inverse_scale_height);
             moments[0] -= kink;
-            moments[1] -= kink * end;
-            moments[2] -= kink * end * end;
+            moments[1] -= kink * t;
+            moments[2] -= kink * t * t;
         }
         moments.map(|m| m * self.inverse_scale_height * self.inverse_scale_height)
     }
