@@ -49,6 +49,7 @@
 //! level or grazing a ray is. Media of constant density need no transcendental function for it.
 
 mod density;
+mod edges;
 mod gradient;
 mod hessian;
 mod line;
@@ -61,6 +62,7 @@ mod region;
 mod segment;
 
 pub use density::Density;
+pub use edges::{EdgePoint, Edges};
 pub use gradient::EndGradients;
 pub use march::{ExtinctionField, MovingSegment, SmoothExtinctionField};
 pub use media::Media;

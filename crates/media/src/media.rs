@@ -6,7 +6,7 @@ use crate::gradient::{self, EndGradients};
 use crate::hessian;
 use crate::line::Line;
 use crate::segment::Piece;
-use crate::{Medium, MediumPoint, Segment};
+use crate::{Edges, Medium, MediumPoint, Region, Segment};
 use glam::{DVec3, Vec3};
 use tyndall_math::{Aabb, Jet, Ray};
 
@@ -83,7 +83,7 @@ impl Media {
     /// Exact and in f64, for formulas that go on with [`Jet`]s. Zero where the points coincide to f32; elsewhere as
     /// [`Media::optical_depth_gradient`], and constant where a column is infinite or above 10²⁰ m. The Hessian has the
     /// motion and the curvature of region boundaries and the kink of a height fog at its base; where the line grazes
-    /// those within a milliradian, it is bounded instead of exact.
+    /// those within a milliradian, it is bounded instead of exact. On the base all derivatives are those from above.
     pub fn optical_depth_jet(&self, fixed: DVec3, moving: DVec3) -> [Jet; 3] {
         hessian::of_end(&self.list, fixed, moving)
     }
@@ -99,6 +99,20 @@ impl Media {
         length: f64,
     ) -> [Jet; 3] {
         hessian::of_translation(&self.list, Line { origin, direction }, length)
+    }
+
+    /// The edges of all boxes of medium, as seen from `x`: where an integral over directions finds second derivatives that
+    /// [`Media::optical_depth_jet`] does not have.
+    pub fn edges(&self, x: Vec3) -> Edges<'_> {
+        Edges::new(self.matter(), x.as_dvec3())
+    }
+
+    /// Whether rays from `p` can graze a ball of medium from outside. Across its limb the Hessian of optical depth grows like δ^(−3/2)
+    /// with the angle δ, and has no integral over directions.
+    pub fn has_limb_from(&self, p: Vec3) -> bool {
+        self.matter()
+            .map(Medium::region)
+            .any(|region| matches!(region, Region::Sphere { .. }) && !region.contains(p))
     }
 
     /// Whether all scattering is isotropic.

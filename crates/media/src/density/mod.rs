@@ -8,7 +8,7 @@ mod height;
 use crate::line::Line;
 use glam::{DVec3, Vec3};
 use height::HeightProfile;
-use tyndall_math::Ray;
+use tyndall_math::{Jet, Ray};
 
 /// A density field; multiplies a medium's extinction, scattering and emission.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,13 +39,25 @@ impl Density {
         }
     }
 
-    /// The gradient of the density at `p`, per metre; on the kink at a fog's base, that of the constant side.
+    /// The gradient of the density at `p`, per metre; on the kink at a fog's base, that from above.
     pub fn gradient(&self, p: Vec3) -> Vec3 {
         match *self {
-            Self::Height { base, scale_height } if p.y > base => {
+            Self::Height { base, scale_height } if p.y >= base => {
                 Vec3::new(0.0, -self.value(p) / scale_height, 0.0)
             }
             Self::Constant(_) | Self::Height { .. } => Vec3::ZERO,
+        }
+    }
+
+    /// The density at `p` with its derivatives, in f64; on the kink at a fog's base those from above.
+    pub(crate) fn jet(&self, p: DVec3) -> Jet {
+        match *self {
+            Self::Height { base, scale_height } if p.y >= f64::from(base) => {
+                let per_metre = 1.0 / f64::from(scale_height);
+                Jet::linear((f64::from(base) - p.y) * per_metre, -per_metre * DVec3::Y).exp()
+            }
+            Self::Height { .. } => 1.0.into(),
+            Self::Constant(density) => f64::from(density).into(),
         }
     }
 

@@ -12,6 +12,7 @@
 //! [`Derivatives::Aware`] asks for them (silhouettes of what stands before lights with extent at a finite distance), never in the Hessian. Lamps
 //! without extent have hard shadows, which no derivative at a point knows of.
 
+mod edges;
 mod light_cells;
 mod point;
 mod second_order;
@@ -49,7 +50,7 @@ pub struct Inscattered {
     pub value: Vec3,
     /// Its gradient per metre, one vector per channel; zero unless asked for.
     pub gradient: [Vec3; 3],
-    /// Its Hessian per square metre, one symmetric matrix per channel; `None` unless asked for.
+    /// Its Hessian per square metre, one symmetric matrix per channel; `None` unless asked for, and where there is none.
     pub hessian: Option<[DMat3; 3]>,
     /// Standard error of the value.
     pub value_error: Vec3,
@@ -61,9 +62,9 @@ pub struct Inscattered {
 
 /// Light scattered once at `x` towards `towards` (weighting all directions alike where `None`), from `samples` samples.
 ///
-/// Value and its error do not depend on `order` and `derivatives`. The Hessian has shadows stay; it leaves out what kinks in density and in
-/// the outline of boxes add (the gradient jumps there), that the limb of a curved emitter moves (emitters made of flat pieces have
-/// none), and second derivatives of the shares in which media of different phase functions and changing densities mix.
+/// Value and its error do not depend on `order` and `derivatives`. The Hessian knows of the kinks that boxes of medium and the base of a
+/// height fog make; on the base it is that from above. It has shadows stay, and leaves out that the limb of a curved emitter moves
+/// (emitters made of flat pieces have none). There is none for light with extent outside of a ball of medium, whose limb no sample knows.
 pub fn single<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
@@ -74,12 +75,19 @@ pub fn single<G: Geometry, L: Lights>(
 ) -> Inscattered {
     let point = Inscatter::new(world, x, towards);
     let aware = order >= Order::Gradient && derivatives == Derivatives::Aware;
+    let edges = (order == Order::Hessian).then(|| world.media.edges(x));
+    let mut extended = false;
     let spread = in_batches(samples, key, |key, n| {
         let mut mean = [0.0; NUMBERS];
         let mut draws: Option<Vec<Draw>> = aware.then(Vec::new);
         for i in 0..n {
-            let sample = point.sample(key, i as u64, order, draws.as_mut());
+            let i = i as u64;
+            let mut sample = point.sample(key, i, order, draws.as_mut());
+            if let Some(edges) = &edges {
+                edges::add(&point, edges, (key, i), &mut sample);
+            }
             add(&mut mean, &sample, order, 1.0 / n as f64);
+            extended |= sample.extended;
         }
         if let Some(draws) = draws {
             let moved = Sample {
@@ -93,10 +101,11 @@ pub fn single<G: Geometry, L: Lights>(
     let vector = |k: usize, f: fn(&Welford) -> f64| {
         Vec3::from([0, 1, 2].map(|axis| f(&spread[3 * k + axis]) as f32))
     };
+    let known = order == Order::Hessian && !(extended && world.media.has_limb_from(x));
     let hessian = |f: fn(&Welford) -> f64| {
         let matrix =
             |c: usize| DMat3::from_cols_array(&std::array::from_fn(|k| f(&spread[12 + 9 * c + k])));
-        (order == Order::Hessian).then(|| [0, 1, 2].map(matrix))
+        known.then(|| [0, 1, 2].map(matrix))
     };
     Inscattered {
         value: vector(0, Welford::mean),

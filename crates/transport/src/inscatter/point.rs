@@ -18,12 +18,12 @@ use tyndall_media::{MediumPoint, PhaseValue};
 pub struct Inscatter<'w, 'm, G, L> {
     pub(super) world: &'w World<'m, G, L>,
     pub(super) x: Vec3,
-    medium: MediumPoint<'m>,
+    pub(super) medium: MediumPoint<'m>,
     choice: LightChoice,
     /// Towards the eye; any direction where nothing depends on it.
     pub(super) w_o: Vec3,
     /// Weights all directions alike, whatever the medium does.
-    alike: bool,
+    pub(super) alike: bool,
 }
 
 /// One sample's value and derivatives.
@@ -32,6 +32,8 @@ pub(super) struct Sample {
     pub(super) value: Vec3,
     pub(super) gradient: [Vec3; 3],
     pub(super) hessian: [DMat3; 3],
+    /// Whether any of it comes from lights with extent.
+    pub(super) extended: bool,
 }
 
 impl Sample {
@@ -39,6 +41,7 @@ impl Sample {
         value: Vec3::ZERO,
         gradient: [Vec3::ZERO; 3],
         hessian: [DMat3::ZERO; 3],
+        extended: false,
     };
 }
 
@@ -113,12 +116,11 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
     }
 
     /// The phase function for light from `w_i`, with its derivatives.
-    fn phase(&self, w_i: Vec3) -> PhaseValue {
+    pub(super) fn phase(&self, w_i: Vec3) -> PhaseValue {
         if self.alike {
             PhaseValue {
                 value: Vec3::splat(0.25 / PI),
                 slope: Vec3::ZERO,
-                curvature: Vec3::ZERO,
                 gradient: [Vec3::ZERO; 3],
             }
         } else {
@@ -164,19 +166,27 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
             });
             1.0 / (pdf + other)
         };
-        let mut found = |light, distance, radiance: Vec3, normal, size| {
+        self.shining(w_i, |mut way, light| {
+            way.radiance *= weight(light);
+            if let Some(arrives) = self.arrives(&way) {
+                self.add(&way, light, arrives, order, sum);
+            }
+        });
+    }
+
+    /// Tells what shines from `w_i`, with its light: the emitter met, or what is infinitely far away.
+    pub(super) fn shining(&self, w_i: Vec3, mut found: impl FnMut(LightSample, Option<usize>)) {
+        let mut found = |light, distance, radiance, normal, size| {
             let way = LightSample {
                 w_i,
                 distance,
-                radiance: radiance * weight(light),
+                radiance,
                 pdf: 1.0,
                 delta: false,
                 normal,
                 size,
             };
-            if let Some(arrives) = self.arrives(&way) {
-                self.add(&way, light, arrives, order, sum);
-            }
+            found(way, light);
         };
         let ray = Ray::new(self.x, w_i);
         match self.world.geometry.intersect(&ray, f32::INFINITY) {
@@ -191,7 +201,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
     }
 
     /// Transmittance of `way`; `None` where there is no light or a surface stands between.
-    fn arrives(&self, way: &LightSample) -> Option<Vec3> {
+    pub(super) fn arrives(&self, way: &LightSample) -> Option<Vec3> {
         if !way.radiance.is_finite() || way.radiance == Vec3::ZERO {
             return None;
         }
@@ -213,6 +223,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
         let phase = self.phase(way.w_i);
         let value = way.radiance * arrives * phase.value;
         sum.value += value;
+        sum.extended |= !way.delta;
         if order == Order::Value {
             return;
         }
@@ -230,11 +241,8 @@ impl<'w, 'm, G: Geometry, L: Lights> Inscatter<'w, 'm, G, L> {
             *sum += log_gradient[c] * value[c];
         }
         if order == Order::Hessian {
-            for (sum, h) in sum
-                .hessian
-                .iter_mut()
-                .zip(second_order::hessian(self, way, light, &phase))
-            {
+            let hessian = second_order::hessian(self, way, light);
+            for (sum, h) in sum.hessian.iter_mut().zip(hessian) {
                 *sum += h;
             }
         }

@@ -3,13 +3,13 @@
 use super::GRAZING;
 use super::point::Inscatter;
 use crate::world::{Geometry, LightSample, Lights};
-use glam::{DMat3, DVec3};
+use glam::DMat3;
+use std::f64::consts::PI;
 use tyndall_math::Jet;
-use tyndall_media::PhaseValue;
 
 /// The Hessian of a sample when its point moves, for each colour channel; zero where it does not fit into f64.
 ///
-/// f(x) = c p(μ) e^−τ(x, x′) H(x),  H = cosθ′/r² = n′·v/r³,  v = x − x′,  r = |v|,  μ = ω·v/r
+/// f(x) = c p(x, μ) e^−τ(x, x′) H(x),  H = cosθ′/r² = n′·v/r³,  v = x − x′,  r = |v|,  μ = ω·v/r
 ///
 /// * c – radiance of the sample over its density, and over H where it stands: H is 1 at the point itself.
 /// * x′ – the emitter's point, which stays; n′ – its normal.
@@ -21,7 +21,6 @@ pub(super) fn hessian<G: Geometry, L: Lights>(
     point: &Inscatter<'_, '_, G, L>,
     way: &LightSample,
     light: Option<usize>,
-    phase: &PhaseValue,
 ) -> [DMat3; 3] {
     let (x, w_o) = (point.x.as_dvec3(), point.w_o.as_dvec3());
     let w_i = way.w_i.as_dvec3().normalize();
@@ -47,14 +46,13 @@ pub(super) fn hessian<G: Geometry, L: Lights>(
         let tau = media.optical_depth_jet(emitter, x);
         ((v / r).dot_fixed(w_o), tau, h)
     };
+    let p = if point.alike {
+        [Jet::from(0.25 / PI); 3]
+    } else {
+        point.medium.phase_jet(point.w_o, way.w_i, mu)
+    };
     std::array::from_fn(|c| {
-        let p = mu.map(
-            phase.value[c].into(),
-            phase.slope[c].into(),
-            phase.curvature[c].into(),
-        );
-        let shares: DVec3 = phase.gradient[c].as_dvec3();
-        let f = (p + Jet::linear(0.0, shares)) * (-tau[c]).exp() * h;
+        let f = p[c] * (-tau[c]).exp() * h;
         let hessian = f.hessian * f64::from(way.radiance[c]);
         if hessian.is_finite() {
             hessian

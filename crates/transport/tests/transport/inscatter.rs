@@ -499,9 +499,9 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
     #[test]
     fn values_and_derivatives_are_finite(
-        kind in 0..4, log_distance in -6.0f32..6.0, log_sigma in -7.0f32..6.0, g in -0.999f32..0.999,
+        kind in 0..5, log_distance in -6.0f32..6.0, log_sigma in -7.0f32..6.0, g in -0.999f32..0.999,
         direction in prop::array::uniform3(-1.0f32..1.0), grazing in prop::bool::ANY, coincides in prop::bool::ANY,
-        forward in prop::bool::ANY, covered in prop::bool::ANY, index in 0u64..1000
+        forward in prop::bool::ANY, covered in prop::bool::ANY, boxed in prop::bool::ANY, index in 0u64..1000
     ) {
         let distance = 10f32.powf(log_distance);
         let sigma_t = if log_sigma < -6.5 { 0.0 } else { 10f32.powf(log_sigma) };
@@ -514,11 +514,18 @@ proptest! {
             0 => vec![Lamp::Point { position: p, intensity: 1.0 }],
             1 => vec![Lamp::Card { card: Card { corner: p, edges }, radiance: 1.0 }],
             2 => vec![Lamp::Ball { center: w * distance, radius: 0.9 * distance, radiance: 1.0 }],
+            3 => vec![Lamp::Sky { radiance: 1.0 }],
             _ => Vec::new(),
         };
+        // Around the point, or with a corner there.
+        let corner = if coincides { Vec3::ZERO } else { w * (0.4 * distance) };
+        let region = Region::Box { min: corner - 0.5 * distance, max: corner };
+        let region = if boxed { region } else { Region::Everywhere };
+        let phase = PhaseFunction::henyey_greenstein(g).unwrap();
+        let media = fog(sigma_t, 0.5, region, phase);
         let cards = vec![Card { corner: p * 0.5 + 0.1 * edges[0], edges }];
         let stage = Stage { lamps, cards: if covered { cards } else { Vec::new() } };
-        let world = World { geometry: &stage, lights: &stage, media: &medium(sigma_t, g) };
+        let world = World { geometry: &stage, lights: &stage, media: &media };
         let towards = if forward { -w } else { v };
         for towards in [None, Some(towards)] {
             let asked = (Order::Hessian, Derivatives::Aware);

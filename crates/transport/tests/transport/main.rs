@@ -9,4 +9,5 @@ mod exact;
 mod inscatter;
 mod rig;
 mod samplers;
+mod second_order;
 mod stage;

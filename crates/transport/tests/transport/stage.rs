@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
+use tyndall_math::warp::uniform_sphere;
 use tyndall_math::{Frame, Ray, SphericalRectangle};
 use tyndall_transport::{Bsdf, Geometry, LightSample, Lights, SurfaceHit};
 
@@ -43,6 +44,8 @@ pub(crate) enum Lamp {
         radius: f32,
         radiance: f32,
     },
+    /// Radiance from everywhere; the only lamp of its stage.
+    Sky { radiance: f32 },
 }
 
 /// Lamps and what stands in their light; lamps themselves hide nothing.
@@ -64,7 +67,7 @@ impl Stage {
         let lamps = self.lamps.iter().enumerate();
         lamps.filter_map(|(light, lamp)| {
             let (t, n, size, radiance) = match *lamp {
-                Lamp::Point { .. } => return None,
+                Lamp::Point { .. } | Lamp::Sky { .. } => return None,
                 Lamp::Card { card, radiance } => {
                     (card.intersect(ray)?, card.normal(), 2.0, radiance)
                 }
@@ -161,6 +164,17 @@ impl Lights for Stage {
                     size: 0.0,
                 });
             }
+            Lamp::Sky { radiance } => {
+                return Some(LightSample {
+                    w_i: uniform_sphere(u),
+                    distance: f32::INFINITY,
+                    radiance: Vec3::splat(radiance),
+                    pdf: 0.25 / PI,
+                    delta: false,
+                    normal: Vec3::ZERO,
+                    size: 0.0,
+                });
+            }
             Lamp::Card { card, .. } => {
                 SphericalRectangle::new(p, card.corner, card.edges)?
                     .sample(u)
@@ -191,6 +205,7 @@ impl Lights for Stage {
     fn pdf(&self, light: usize, p: Vec3, w_i: Vec3) -> f32 {
         match self.lamps[light] {
             Lamp::Point { .. } => 0.0,
+            Lamp::Sky { .. } => 0.25 / PI,
             Lamp::Card { card, .. } => SphericalRectangle::new(p, card.corner, card.edges)
                 .map_or(0.0, |seen| 1.0 / seen.solid_angle()),
             Lamp::Ball { center, radius, .. } => {
@@ -200,6 +215,20 @@ impl Lights for Stage {
                 let rest = 1.0 - 0.5 * (w_i.as_dvec3() - axis).length_squared() / all;
                 (0.25 / (std::f64::consts::PI * all * rest.max(1e-12).sqrt())) as f32
             }
+        }
+    }
+
+    fn environment(&self) -> &[usize] {
+        match self.lamps.as_slice() {
+            [Lamp::Sky { .. }] => &[0],
+            _ => &[],
+        }
+    }
+
+    fn environment_radiance(&self, light: usize, _w_i: Vec3) -> Vec3 {
+        match self.lamps[light] {
+            Lamp::Sky { radiance } => Vec3::splat(radiance),
+            _ => Vec3::ZERO,
         }
     }
 
