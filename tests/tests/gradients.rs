@@ -17,6 +17,7 @@ use tyndall_math::{Key, Purpose};
 use tyndall_scene::LoadOptions;
 use tyndall_tests::program::workspace;
 use tyndall_transport::gather::{Derivatives, GatherPattern, multiple_towards};
+use tyndall_transport::path::Reach;
 
 /// Independent records at each point, and their paths.
 const RECORDS: u64 = 32;
@@ -51,7 +52,15 @@ fn check(
             purpose: Purpose::Record,
             index: point * RECORDS + record,
         };
-        let g = multiple_towards(&world, x, None, &pattern, derivatives, None, key);
+        let g = multiple_towards(
+            &world,
+            x,
+            None,
+            &pattern,
+            derivatives,
+            Reach::default(),
+            key,
+        );
         for (spread, slope) in spread.iter_mut().zip(g.gradient[GREEN].to_array()) {
             spread.push(f64::from(slope));
         }
@@ -123,7 +132,15 @@ fn records_on_surfaces_and_in_corners_are_finite() {
                 purpose: Purpose::Record,
                 index: index as u64,
             };
-            let g = multiple_towards(&world, at.into(), None, &pattern, derivatives, None, key);
+            let g = multiple_towards(
+                &world,
+                at.into(),
+                None,
+                &pattern,
+                derivatives,
+                Reach::default(),
+                key,
+            );
             let finite = g.value.is_finite()
                 && g.value_error.is_finite()
                 && g.gradient

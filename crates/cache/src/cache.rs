@@ -16,12 +16,18 @@ use glam::Vec3;
 ///
 /// Memory for three channels: about 550 bytes a record where balls overlap, 2 kB where they stand alone. Most of it are
 /// the lists of cells: a record is in at most 27 of them, mostly in 12.
+///
+/// Where a ball alone does not say where a record is valid, records carry a tag `T` that does: the side of a wall, the normal of a
+/// surface. See [`Cache::tagged`] and [`Cache::lookup_where`].
 #[derive(Clone, Debug, Default)]
-pub struct Cache<const N: usize> {
+pub struct Cache<const N: usize, T = ()> {
     records: Vec<Record<N>>,
+    tags: Vec<T>,
     octree: Octree,
     /// What the records add to a blend, by slot.
     shapes: Vec<Shape<N>>,
+    /// Tags by slot.
+    slot_tags: Vec<T>,
     /// Index of the record in each slot.
     order: Vec<u32>,
 }
@@ -29,20 +35,37 @@ pub struct Cache<const N: usize> {
 impl<const N: usize> Cache<N> {
     /// A cache without records.
     pub fn new() -> Self {
+        Self::tagged()
+    }
+
+    /// As [`Cache::insert_tagged`], for records that are valid in their whole balls.
+    ///
+    /// # Errors
+    /// Those of [`Cache::insert_tagged`].
+    pub fn insert(&mut self, batch: Vec<Record<N>>) -> Result<(), CacheError> {
+        self.insert_tagged(batch.into_iter().map(|record| (record, ())).collect())
+    }
+}
+
+impl<const N: usize, T: Clone> Cache<N, T> {
+    /// A cache without records, for records with tags.
+    pub fn tagged() -> Self {
         Self {
             records: Vec::new(),
+            tags: Vec::new(),
             octree: Octree::default(),
             shapes: Vec::new(),
+            slot_tags: Vec::new(),
             order: Vec::new(),
         }
     }
 
-    /// Appends records and builds the index anew: one to four microseconds per record held, so insert in batches.
+    /// Appends records with one tag each and builds the index anew: one to four microseconds per record held, so insert in batches.
     ///
     /// # Errors
     /// If a number in a record is not finite, a value is negative, a radius is not positive (1.2e-38 to 8.5e37), or
     /// there are too many records (33 million). The cache is unchanged then.
-    pub fn insert(&mut self, batch: Vec<Record<N>>) -> Result<(), CacheError> {
+    pub fn insert_tagged(&mut self, batch: Vec<(Record<N>, T)>) -> Result<(), CacheError> {
         let n_records = self.records.len() + batch.len();
         if n_records > MAX_RECORDS {
             return Err(CacheError::TooManyRecords {
@@ -50,10 +73,13 @@ impl<const N: usize> Cache<N> {
                 allowed: MAX_RECORDS,
             });
         }
-        for (index, record) in batch.iter().enumerate() {
+        for (index, (record, _)) in batch.iter().enumerate() {
             record.check(index)?;
         }
-        self.records.extend(batch);
+        for (record, tag) in batch {
+            self.records.push(record);
+            self.tags.push(tag);
+        }
         self.build_index();
         Ok(())
     }
@@ -66,6 +92,11 @@ impl<const N: usize> Cache<N> {
     /// Whether there are no records.
     pub fn is_empty(&self) -> bool {
         self.records.is_empty()
+    }
+
+    /// The records' tags, in the same order.
+    pub fn tags(&self) -> &[T] {
+        &self.tags
     }
 
     /// All records in the order of their insertion.
@@ -86,17 +117,34 @@ impl<const N: usize> Cache<N> {
     /// Sums run over records by level (from large radii to small ones by powers of two), by cell, then by insertion.
     #[inline]
     pub fn lookup(&self, p: Vec3) -> Option<[f32; N]> {
+        self.lookup_where(p, |_, _| true)
+    }
+
+    /// As [`Cache::lookup`], from those records alone that are `valid` by their tag and the offset (p − x)/R from the record.
+    #[inline]
+    pub fn lookup_where(&self, p: Vec3, valid: impl Fn(&T, Vec3) -> bool) -> Option<[f32; N]> {
         let mut blend = Blend::EMPTY;
         self.octree.for_each_holding(p, |slot, offset| {
-            let w = weight(1.0 - offset.length());
-            blend.add(w, &self.shapes[slot], offset);
+            if valid(&self.slot_tags[slot], offset) {
+                let w = weight(1.0 - offset.length());
+                blend.add(w, &self.shapes[slot], offset);
+            }
         });
         blend.value()
     }
 
-    /// Whether any record is valid at `p`, that is, whether [`Cache::lookup`] finds a value.
+    /// Whether any ball of a record holds `p`, that is, whether [`Cache::lookup`] finds a value.
     pub fn covers(&self, p: Vec3) -> bool {
         self.octree.covers(p)
+    }
+
+    /// Whether [`Cache::lookup_where`] finds a value.
+    pub fn covers_where(&self, p: Vec3, valid: impl Fn(&T, Vec3) -> bool) -> bool {
+        let mut found = false;
+        self.octree.for_each_holding(p, |slot, offset| {
+            found = found || valid(&self.slot_tags[slot], offset);
+        });
+        found
     }
 
     /// The sum of the weights of all records valid at `p`: 0 where there are none, at least 1 at a record.
@@ -184,6 +232,9 @@ impl<const N: usize> Cache<N> {
         (self.octree, self.order) = Octree::build(&self.balls());
         self.shapes = (self.order.iter())
             .map(|&index| Shape::new(&self.records[index as usize]))
+            .collect();
+        self.slot_tags = (self.order.iter())
+            .map(|&index| self.tags[index as usize].clone())
             .collect();
     }
 }

@@ -19,6 +19,8 @@ pub enum Purpose {
     Validation = 4,
     /// Probes at a point, asked for by a user.
     Probe = 5,
+    /// Walks that fill a coarse field of light.
+    Field = 6,
 }
 
 /// Names a family of samples: `seed` of the run, what it is for, and which pixel, record or probe.

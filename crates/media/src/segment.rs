@@ -120,6 +120,14 @@ impl<'a> Segment<'a> {
         self.pieces.is_empty()
     }
 
+    /// Whether every medium met attenuates all channels alike.
+    pub fn is_grey(&self) -> bool {
+        self.pieces.iter().all(|piece| {
+            let sigma_t = piece.medium.sigma_t();
+            sigma_t == Vec3::splat(sigma_t.x)
+        })
+    }
+
     /// First and last distance with medium; (0, 0) where there is none. The last may be infinite.
     pub fn range(&self) -> (f32, f32) {
         if self.is_empty() {

@@ -182,6 +182,33 @@ impl Film {
     ///
     /// `None` until every pixel has two samples. Unbiased (before the root) where the samples of the two halves are independent.
     pub fn relative_error(&self) -> Option<f64> {
+        Some(mean_of(&self.squared_errors()?).sqrt())
+    }
+
+    /// How many samples each pixel should have so that the error becomes `target`, row by row: in proportion to the root of what a
+    /// sample's variance adds to the squared error, which needs the fewest in all. No pixel is told to have fewer than it has, or
+    /// more than `growth` times that.
+    ///
+    /// `None` until every pixel has two samples. The variances are means over 3 × 3 pixels: two halves tell little of one.
+    pub fn goals(&self, target: f64, growth: u32) -> Option<Vec<u32>> {
+        let (width, height) = (self.crop.width as usize, self.crop.height as usize);
+        let squared = mean_3x3(&self.squared_errors()?, width, height);
+        let taken = || self.counts.iter().map(|[n, m]| n + m);
+        let root: Vec<f64> = (squared.iter().zip(taken()))
+            .map(|(v, n)| (v * f64::from(n)).sqrt())
+            .collect();
+        let scale = mean_of(&root) / (target * target);
+        let goal = |(root, n): (&f64, u32)| {
+            let most = n.saturating_mul(growth);
+            let wanted = (root * scale).ceil().min(f64::from(most)) as u32;
+            // Even, so that the halves stay alike.
+            wanted.saturating_add(wanted & 1).max(n)
+        };
+        Some(root.iter().zip(taken()).map(goal).collect())
+    }
+
+    /// What each pixel adds to the squared error of the image, as far as noise goes.
+    fn squared_errors(&self) -> Option<Vec<f64>> {
         if self.counts.iter().any(|n| n[0] == 0 || n[1] == 0) {
             return None;
         }
@@ -189,14 +216,15 @@ impl Film {
         let colour = self.colour();
         let smooth = colour.each_ref().map(|c| median_5x5(c, width, height));
         let weights = weights(&smooth, mean(&colour));
-        let mut sum = 0.0;
-        for (i, (sums, n)) in self.sums.chunks(self.stride).zip(&self.counts).enumerate() {
+        let pixels = self.sums.chunks(self.stride).zip(&self.counts).enumerate();
+        let squared = pixels.map(|(i, (sums, n))| {
             let variance = self.variance(sums, *n);
-            for (c, weights) in weights.iter().enumerate() {
-                sum += weighted(variance[c], weights[i]);
-            }
-        }
-        Some((sum / (3 * self.counts.len()) as f64).sqrt())
+            (0..3)
+                .map(|c| weighted(variance[c], weights[c][i]))
+                .sum::<f64>()
+                / 3.0
+        });
+        Some(squared.collect())
     }
 
     /// Estimated variance of a pixel's colour from its two halves.
@@ -239,6 +267,24 @@ impl Film {
     }
 }
 
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The mean of the 3 × 3 pixels around every pixel; fewer at the border.
+fn mean_3x3(values: &[f64], width: usize, height: usize) -> Vec<f64> {
+    let around = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+    let pixel = |i: usize| {
+        let (rows, columns) = (around(i / width, height), around(i % width, width));
+        let n = rows.len() * columns.len();
+        let sum: f64 = rows
+            .flat_map(|y| columns.clone().map(move |x| values[y * width + x]))
+            .sum();
+        sum / n as f64
+    };
+    (0..values.len()).map(pixel).collect()
+}
+
 /// One row of a [`Film`].
 #[derive(Debug)]
 pub struct FilmRow<'a> {
@@ -255,6 +301,11 @@ impl FilmRow<'_> {
     /// The columns of the frame that the row covers.
     pub fn columns(&self) -> std::ops::Range<u32> {
         self.x..self.x + self.counts.len() as u32
+    }
+
+    /// Samples that column `x` of the frame has.
+    pub fn taken(&self, x: u32) -> u32 {
+        self.counts[(x - self.x) as usize].iter().sum()
     }
 
     /// Adds sample number `sample` of column `x` of the frame; columns outside the row are a bug of the caller.
@@ -324,15 +375,13 @@ mod tests {
     }
 
     fn fill(film: &mut Film, samples: u32, pixel: impl Fn(u32, u32, u32) -> Pixel) {
-        let taken =
-            |row: &FilmRow<'_>, x: u32| row.counts[(x - row.x) as usize].iter().sum::<u32>();
         for mut row in film.rows() {
             for x in row.columns() {
-                let before = taken(&row, x);
+                let before = row.taken(x);
                 for s in 0..samples {
                     row.add(x, s, &pixel(x, row.y, s));
                 }
-                assert_eq!(taken(&row, x), before + samples);
+                assert_eq!(row.taken(x), before + samples);
             }
         }
     }

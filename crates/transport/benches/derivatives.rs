@@ -9,6 +9,7 @@ use tyndall_media::{PhaseFunction, Region};
 use tyndall_transport::World;
 use tyndall_transport::gather::{self, Derivatives, GatherDirections, GatherPattern};
 use tyndall_transport::inscatter::{self, Inscatter, Order};
+use tyndall_transport::path::Reach;
 
 #[allow(
     dead_code,
@@ -92,7 +93,15 @@ fn record(c: &mut Criterion) {
         b.iter(|| {
             let directions = GatherDirections::new(&world, black_box(x), None);
             (0..pattern.n_rays() as u64)
-                .map(|i| gather::one_of(&directions, &world, x, None, &mut Sampler::new(KEY, i)))
+                .map(|i| {
+                    gather::one_of(
+                        &directions,
+                        &world,
+                        x,
+                        Reach::default(),
+                        &mut Sampler::new(KEY, i),
+                    )
+                })
                 .sum::<Vec3>()
         });
     });
@@ -108,7 +117,7 @@ fn record(c: &mut Criterion) {
                     None,
                     &pattern,
                     derivatives,
-                    None,
+                    Reach::default(),
                     KEY,
                 )
             });

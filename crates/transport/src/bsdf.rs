@@ -9,6 +9,10 @@ use tyndall_math::{Frame, warp};
 /// Smallest GGX width used. Smoother surfaces are drawn this smooth: a lobe of 0.06° that the sampler still resolves in f32.
 const MIN_ALPHA: f32 = 1e-3;
 
+/// Lobes narrower than this width, and brighter than this at normal incidence, make a surface shiny.
+const SHINY_ALPHA: f32 = 0.3;
+const SHINY_REFLECTANCE: f32 = 0.2;
+
 /// Reflection at one surface point.
 ///
 /// f = (1 − F) diffuse/π + F D G / (4 cosθᵢ cosθₒ),  F = f0 + (f90 − f0)(1 − `w_o`·h)⁵
@@ -57,8 +61,24 @@ impl Bsdf {
         self.normal
     }
 
-    fn is_lambert(&self) -> bool {
+    /// Whether light is reflected alike in all directions.
+    pub fn is_lambert(&self) -> bool {
         self.f90 == 0.0 && self.f0 == Vec3::ZERO
+    }
+
+    /// Whether what it reflects depends much on direction: a narrow lobe with a good share of the light.
+    pub(crate) fn is_shiny(&self) -> bool {
+        self.alpha < SHINY_ALPHA && self.f0.max_element() > SHINY_REFLECTANCE
+    }
+
+    /// About the share of even light that leaves along `w_o`, per colour channel; exact for Lambertian surfaces. What GGX loses to
+    /// masking is not counted.
+    pub fn albedo(&self, w_o: Vec3) -> Vec3 {
+        if self.is_lambert() {
+            return self.diffuse;
+        }
+        let fresnel = self.fresnel(self.normal.dot(w_o));
+        (Vec3::ONE - fresnel) * self.diffuse + fresnel
     }
 
     fn fresnel(&self, cos: f32) -> Vec3 {

@@ -34,7 +34,12 @@ impl<'m> FreeFlight<'m> {
     /// Flights along `segment` of a path with RGB `throughput` (not negative, not all zero).
     pub fn new(segment: Segment<'m>, throughput: Vec3) -> Self {
         let total = segment.total();
-        let weights = throughput / throughput.element_sum();
+        let weights = if segment.is_grey() {
+            // Channels alike: picking one would only cut the random numbers' strata into three.
+            Vec3::X
+        } else {
+            throughput / throughput.element_sum()
+        };
         let inside = Vec3::select(total.cmpgt(Vec3::ZERO), weights, Vec3::ZERO);
         let sum = inside.element_sum();
         Self {
@@ -94,15 +99,41 @@ impl<'m> FreeFlight<'m> {
     /// Samples where a flight ends that is known to end on the segment; needs [`FreeFlight::can_stop`].
     pub fn sample_inside(&self, u: f32) -> Option<f32> {
         let (channel, u) = pick(self.inside_weights, u);
-        let tau = -(-u * self.stopped[channel]).ln_1p();
-        // Rounding may carry τ to the very end of the segment.
-        self.segment
-            .distance_at(channel, tau.min(self.total[channel] * (1.0 - f32::EPSILON)))
+        self.inside(channel, u)
     }
 
     /// Density per metre of [`FreeFlight::sample_inside`]: Σ w σt T / (1 − T of all).
     pub fn pdf_inside(&self, stop: &Stop) -> f32 {
         mixture(self.inside_weights, stop.flux / self.stopped)
+    }
+
+    /// Chance that [`FreeFlight::sample_inside`] stays short of distance `t`, Σ w (1 − T) / (1 − T of all), and its slope,
+    /// which is its density per metre.
+    pub(crate) fn cdf_inside(&self, t: f32) -> (f32, f32) {
+        let stopped = absorptance(self.segment.optical_depth(t));
+        let flux = self.segment.sigma_t(t) * (1.0 - stopped);
+        (
+            mixture(self.inside_weights, stopped / self.stopped),
+            mixture(self.inside_weights, flux / self.stopped),
+        )
+    }
+
+    /// Distances between which the first share `u` of the flights of [`FreeFlight::sample_inside`] has ended, channels by
+    /// themselves and thus all together; the same twice where the channels are alike.
+    pub(crate) fn quantile_inside(&self, u: f32) -> Option<(f32, f32)> {
+        (0..3)
+            .filter(|&c| self.inside_weights[c] > 0.0)
+            .filter_map(|c| self.inside(c, u))
+            .map(|t| (t, t))
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// The distance at which a share `u` of the flights of one channel that end on the segment has ended.
+    fn inside(&self, channel: usize, u: f32) -> Option<f32> {
+        let tau = -(-u * self.stopped[channel]).ln_1p();
+        // Rounding may carry τ to the very end of the segment.
+        self.segment
+            .distance_at(channel, tau.min(self.total[channel] * (1.0 - f32::EPSILON)))
     }
 }
 

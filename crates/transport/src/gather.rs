@@ -5,7 +5,8 @@
 
 use crate::lamp_directions::LampDirections;
 use crate::occlusion::{self, Seen};
-use crate::path::{FirstEvent, Source, Start, Vertex, Visitor, lamps_in_fog, trace};
+use crate::path::{FirstEvent, Reach, Source, Start, Vertex, Visitor, lamps_in_fog, trace};
+use crate::walls::Walls;
 use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, World};
 use glam::{Quat, Vec3};
@@ -18,7 +19,7 @@ use tyndall_media::MediumPoint;
 /// Batches over which standard errors are taken. Paths are independent between them, directions are parts of one set: where the noise of
 /// paths is what counts the errors told are those found, and where light differs by direction alone they are overstated, at 1024
 /// directions about threefold at an edge and more where light is smooth.
-const BATCHES: usize = 16;
+pub(crate) const BATCHES: usize = 16;
 /// The displacement field ends this far short of the nearest surface, light or boundary.
 const WARP_REACH: f32 = 0.9;
 /// It reaches at least this share of the nearest surface's distance or of a free path, however close a boundary of a medium
@@ -40,6 +41,8 @@ pub struct Gathered {
     pub nearest: f32,
     /// Harmonic mean of the distances to surfaces, in metres; infinite without surfaces.
     pub harmonic_mean_distance: f32,
+    /// The nearest surfaces that gather rays met.
+    pub walls: Walls,
 }
 
 /// Directions in which light is gathered at a point: by the phase function there, and close to lamps.
@@ -229,15 +232,15 @@ impl GatherPattern {
 
 /// Gathers multiple-scattered light at `x` along `pattern`, weighting all directions alike.
 ///
-/// `max_depth` counts the scattering at `x` itself.
+/// `reach` counts the scattering at `x` itself.
 pub fn multiple<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
     pattern: &GatherPattern,
-    max_depth: Option<u32>,
+    reach: Reach<'_>,
     key: Key,
 ) -> Gathered {
-    multiple_towards(world, x, None, pattern, Derivatives::Aware, max_depth, key)
+    multiple_towards(world, x, None, pattern, Derivatives::Aware, reach, key)
 }
 
 /// As [`multiple`], with directions weighted by the phase function at `x` for light that leaves `towards` the eye, and a choice of
@@ -250,7 +253,7 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     towards: Option<Vec3>,
     pattern: &GatherPattern,
     derivatives: Derivatives,
-    max_depth: Option<u32>,
+    reach: Reach<'_>,
     key: Key,
 ) -> Gathered {
     let directions = GatherDirections::new(world, x, towards);
@@ -267,7 +270,7 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
         SphericalFibonacci::new(1, u).rotation()
     };
 
-    let starts: Vec<(Start, GatherDirection)> = (0..BATCHES)
+    let starts: Vec<(Start<'_>, GatherDirection)> = (0..BATCHES)
         .flat_map(|batch| {
             let (group, member) = (batch / pattern.group, batch % pattern.group);
             let turn = turn(group);
@@ -284,7 +287,7 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
                     ray,
                     hit: Some(world.geometry.intersect(&ray, f32::INFINITY)),
                     first: FirstEvent::Any,
-                    max_depth: max_depth.map(|d| d.saturating_sub(1)),
+                    reach: reach.behind_one(),
                 };
                 (start, direction)
             })
@@ -355,6 +358,7 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
         gradient_error: [er, eg, eb],
         nearest,
         harmonic_mean_distance: starts.len() as f32 / inverse,
+        walls: Walls::new(starts.iter().filter_map(|(s, _)| s.hit.as_ref()?.as_ref())),
     }
 }
 
@@ -369,11 +373,11 @@ fn random_rotation(sampler: &mut Sampler) -> [f32; 3] {
 pub fn one<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
-    max_depth: Option<u32>,
+    reach: Reach<'_>,
     sampler: &mut Sampler,
 ) -> Vec3 {
     let directions = GatherDirections::new(world, x, None);
-    one_of(&directions, world, x, max_depth, sampler)
+    one_of(&directions, world, x, reach, sampler)
 }
 
 /// As [`one`], for directions prepared at `x`, with the phase function they were prepared for.
@@ -381,7 +385,7 @@ pub fn one_of<G: Geometry, L: Lights>(
     directions: &GatherDirections<'_>,
     world: &World<'_, G, L>,
     x: Vec3,
-    max_depth: Option<u32>,
+    reach: Reach<'_>,
     sampler: &mut Sampler,
 ) -> Vec3 {
     let direction = directions.sample(sampler.next_2d());
@@ -389,7 +393,7 @@ pub fn one_of<G: Geometry, L: Lights>(
         ray: Ray::new(x, direction.w_i),
         hit: None,
         first: FirstEvent::Any,
-        max_depth: max_depth.map(|d| d.saturating_sub(1)),
+        reach: reach.behind_one(),
     };
     let mut visitor = ScatteredLight::default();
     trace(world, &start, sampler, &mut visitor);
@@ -416,7 +420,7 @@ impl Visitor for ScatteredLight {
 }
 
 /// The key of one batch of a gather; the highest bit keeps it from the keys of whoever draws with `key` itself.
-fn batch_key(key: Key, batch: usize) -> Key {
+pub(crate) fn batch_key(key: Key, batch: usize) -> Key {
     Key {
         index: key
             .index
@@ -428,7 +432,7 @@ fn batch_key(key: Key, batch: usize) -> Key {
 }
 
 /// D of the displacement field at `x`.
-fn warp_radius<G, L: Lights>(world: &World<'_, G, L>, x: Vec3, nearest: f32) -> f32 {
+pub(crate) fn warp_radius<G, L: Lights>(world: &World<'_, G, L>, x: Vec3, nearest: f32) -> f32 {
     let light = world.lights.distance_to_point_lights(x);
     let solid = nearest.min(light);
     let boundary = world.media.distance_to_boundary(x);
@@ -447,13 +451,13 @@ fn warp_radius<G, L: Lights>(world: &World<'_, G, L>, x: Vec3, nearest: f32) -> 
 
 /// Sums of value and gradient by batch; f64 because thousands of terms of both signs are added.
 #[derive(Default)]
-struct Batches {
+pub(crate) struct Batches {
     sums: [[glam::DVec3; 4]; BATCHES],
     counts: [usize; BATCHES],
 }
 
 impl Batches {
-    fn add(&mut self, batch: usize, value: Vec3, gradient: [Vec3; 3]) {
+    pub(crate) fn add(&mut self, batch: usize, value: Vec3, gradient: [Vec3; 3]) {
         let [dr, dg, db] = gradient;
         for (sum, term) in self.sums[batch].iter_mut().zip([value, dr, dg, db]) {
             *sum += term.as_dvec3();
@@ -469,13 +473,13 @@ impl Batches {
         }
     }
 
-    fn means(&self) -> [Vec3; 4] {
+    pub(crate) fn means(&self) -> [Vec3; 4] {
         let n = self.counts.iter().sum::<usize>().max(1) as f64;
         std::array::from_fn(|k| (self.sums.iter().map(|s| s[k]).sum::<glam::DVec3>() / n).as_vec3())
     }
 
     /// Standard errors from the spread of batch means; infinite where fewer than two batches hold samples.
-    fn errors(&self) -> [Vec3; 4] {
+    pub(crate) fn errors(&self) -> [Vec3; 4] {
         let full: Vec<usize> = (0..BATCHES).filter(|&b| self.counts[b] > 0).collect();
         let n = full.len() as f64;
         if full.len() < 2 {

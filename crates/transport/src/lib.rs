@@ -2,13 +2,14 @@
 //! multiple scattering is made of, with its gradient.
 //!
 //! The crate sees a scene through two small traits, so that anything which can be hit and anything that shines will do; a
-//! medium is one of `tyndall-media`. Five things to know:
+//! medium is one of `tyndall-media`. Six things to know:
 //!
 //! * [`World`]: surfaces ([`Geometry`]), lights ([`Lights`]) and media, borrowed, together;
 //! * [`path::trace`]: one path through a world; a [`path::Visitor`] hears of every vertex and of all light it finds.
 //!   [`layers::LayerVisitor`] sorts that light into the layers of an image;
 //! * [`single::SegmentLight`]: light scattered once on a ray, straight from the lights, also right beside a lamp;
-//! * [`inscatter::single`]: the same at one point, with gradient and Hessian;
+//! * [`shafts::Shafts`]: the same from one light without extent, by the stretches of the ray that it shines on;
+//! * [`inscatter::single`]: light scattered once at one point, with gradient and Hessian;
 //! * [`gather::multiple`]: light scattered before that arrives at a point, its gradient, and the standard errors of both.
 //!
 //! # Example
@@ -53,7 +54,7 @@
 //! let fog = Medium::new(MediumParams::new(Vec3::ONE, Vec3::splat(0.8)))?;
 //! let world = World { geometry: &Empty, lights: &Lamp, media: &Media::new(vec![fog]) };
 //! let key = Key { seed: 1, purpose: Purpose::Probe, index: 0 };
-//! let found = gather::multiple(&world, Vec3::X, &gather::GatherPattern::new(4096), None, key);
+//! let found = gather::multiple(&world, Vec3::X, &gather::GatherPattern::new(4096), Default::default(), key);
 //! assert!((found.value.x / 0.07814 - 1.0).abs() < 0.05, "{found:?}");
 //! // It falls with distance, here by 0.133 a metre.
 //! assert!((found.gradient[0].x / -0.1328 - 1.0).abs() < 0.15, "{found:?}");
@@ -74,16 +75,22 @@
 
 pub mod batches;
 pub mod bsdf;
+pub mod direct;
 pub mod emission;
+pub mod field;
 pub mod free_flight;
 pub mod gather;
 pub mod inscatter;
+pub mod irradiance;
 pub mod lamp_directions;
 pub mod layers;
 pub mod light_choice;
 mod occlusion;
 pub mod path;
+mod segment_warp;
+pub mod shafts;
 pub mod single;
+pub mod walls;
 mod warp_translation;
 pub mod world;
 

@@ -72,6 +72,23 @@ impl LightChoice {
         Self { cumulative }
     }
 
+    /// The choice among the same lights in the same proportions, but for those `taken` by other means: their importance is
+    /// zero, and only the even share still picks them.
+    pub fn without(&self, taken: &[usize]) -> Self {
+        Self::sum(self.cumulative.len(), |light| {
+            if taken.contains(&light) {
+                0.0
+            } else {
+                self.importance(light)
+            }
+        })
+    }
+
+    fn importance(&self, light: usize) -> f32 {
+        let below = light.checked_sub(1).map_or(0.0, |l| self.cumulative[l]);
+        self.cumulative[light] - below
+    }
+
     fn total(&self) -> f32 {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
@@ -98,12 +115,7 @@ impl LightChoice {
         if share >= 1.0 {
             return even;
         }
-        let below = if light == 0 {
-            0.0
-        } else {
-            self.cumulative[light - 1]
-        };
-        even + (1.0 - share) * (self.cumulative[light] - below) / self.total()
+        even + (1.0 - share) * self.importance(light) / self.total()
     }
 
     /// All of the choices where no light seems to arrive, none where there is one light alone.

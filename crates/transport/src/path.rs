@@ -4,6 +4,7 @@
 //! by multiple importance sampling. A [`Visitor`] sees every contribution and decides where it belongs.
 
 use crate::emission;
+use crate::field::Field;
 use crate::free_flight::FreeFlight;
 use crate::lamp_directions::LampDirections;
 use crate::light_choice::LightChoice;
@@ -48,6 +49,36 @@ pub enum Source {
     Far(Vec3),
     /// The medium itself emits where the path ends.
     Medium,
+    /// The last vertex scatters light whose way is not followed; how that light changes when the vertex moves, per metre and as a
+    /// share of it, by colour channel.
+    Scattered([Vec3; 3]),
+}
+
+/// How far paths are followed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reach<'f> {
+    /// Most scattering events between light and the start of the path; `None` for no limit.
+    pub max_depth: Option<u32>,
+    /// Light behind the first scattering that need not be followed; asked only where depth has no limit.
+    pub field: Option<&'f Field>,
+}
+
+impl Reach<'_> {
+    /// Paths of at most `max_depth` scattering events, or of any number.
+    pub fn depth(max_depth: Option<u32>) -> Self {
+        Self {
+            max_depth,
+            field: None,
+        }
+    }
+
+    /// What is left of it behind one scattering.
+    pub(crate) fn behind_one(self) -> Self {
+        Self {
+            max_depth: self.max_depth.map(|d| d.saturating_sub(1)),
+            ..self
+        }
+    }
 }
 
 /// Receives a path's vertices and what it gathers.
@@ -73,15 +104,15 @@ pub enum FirstEvent {
 
 /// A path about to start.
 #[derive(Clone, Copy, Debug)]
-pub struct Start {
+pub struct Start<'f> {
     /// First stretch of the path, towards the scene.
     pub ray: Ray,
     /// The surface `ray` meets, where the caller knows it already.
     pub hit: Option<Option<SurfaceHit>>,
     /// What the first stretch may do.
     pub first: FirstEvent,
-    /// Most scattering events between light and the start of the path; `None` for no limit.
-    pub max_depth: Option<u32>,
+    /// How far it goes.
+    pub reach: Reach<'f>,
 }
 
 /// How the last vertex could also have found a light, for multiple importance sampling.
@@ -128,7 +159,7 @@ fn power_heuristic(own: f32, other: f32) -> f32 {
 /// Traces one path and tells `visitor` all light it finds.
 pub fn trace<'m, G: Geometry, L: Lights>(
     world: &World<'m, G, L>,
-    start: &Start,
+    start: &Start<'_>,
     sampler: &mut Sampler,
     visitor: &mut impl Visitor,
 ) {
@@ -138,7 +169,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
     let mut rival = Rival::None;
     let mut first = start.first;
     let mut events = 0;
-    let may_scatter = |events: u32| start.max_depth.is_none_or(|max| events < max);
+    let may_scatter = |events: u32| start.reach.max_depth.is_none_or(|max| events < max);
 
     loop {
         sampler.start_set(1 + events * SETS_PER_STRETCH);
@@ -157,6 +188,19 @@ pub fn trace<'m, G: Geometry, L: Lights>(
             }
         }
 
+        if let (Some(field), FirstEvent::Any, None) =
+            (start.reach.field, first, start.reach.max_depth)
+        {
+            // Light that media emit is sampled; all that scatters on the stretch or at its end is read.
+            let end = (&ray, hit.as_ref());
+            if field.end(world, end, &flight, throughput, sampler, visitor) {
+                if let Some(e) = emission::sample(world, &ray, &flight, sampler.next_1d()) {
+                    let vertex = Vertex::Medium(ray.at(e.t), &e.medium);
+                    visitor.light(throughput * e.value, Some(vertex), Source::Medium);
+                }
+                return;
+            }
+        }
         let lights = if first == FirstEvent::Any && !flight.segment().is_empty() {
             let [u, v] = sampler.next_2d();
             let w = sampler.next_2d();
@@ -427,7 +471,7 @@ fn reflection_pdf(hit: &SurfaceHit, lamps: &LampDirections, w_o: Vec3, w_i: Vec3
     (1.0 - lamps.share()) * hit.bsdf.pdf(w_o, w_i) + lamps.pdf(w_i)
 }
 
-fn source(p: Vec3, s: &LightSample) -> Source {
+pub(crate) fn source(p: Vec3, s: &LightSample) -> Source {
     if s.distance.is_finite() {
         Source::Point(p + s.w_i * s.distance, s.normal)
     } else {

@@ -7,11 +7,14 @@ use crate::free_flight::{FreeFlight, Stop};
 use crate::light_choice::LightChoice;
 use crate::world::{Geometry, LightSample, Lights, World};
 use glam::Vec3;
+use smallvec::SmallVec;
 use tyndall_math::{Ray, offset_origin, warp::Equiangular};
 use tyndall_media::{MediumPoint, transmittance};
 
 /// Share of equiangular samples where the light is near enough to have a place.
-const EQUIANGULAR_SHARE: f32 = 0.5;
+pub(crate) const EQUIANGULAR_SHARE: f32 = 0.5;
+/// With fewer probes a light is as well served by samples.
+const LEAST_PROBES: f32 = 1.5;
 /// On an endless segment the light is chosen for the part that lets through more than e⁻⁸ of the light in the clearest
 /// channel.
 const CHOICE_DEPTH: f32 = 8.0;
@@ -22,6 +25,8 @@ pub struct SegmentLight<'f, 'm> {
     ray: Ray,
     flight: &'f FreeFlight<'m>,
     choice: LightChoice,
+    /// Lights that are left out here: shafts bring their light.
+    taken: SmallVec<[usize; 4]>,
 }
 
 /// The density with which [`SegmentLight::sample`] would have found lights from one of its distances.
@@ -54,7 +59,7 @@ impl DensityAt {
 }
 
 /// Density per metre of a distance `t` from the two ways of picking one.
-fn mixed(equiangular: &Equiangular, t: f32, by_transmittance: f32) -> f32 {
+pub(crate) fn mixed(equiangular: &Equiangular, t: f32, by_transmittance: f32) -> f32 {
     EQUIANGULAR_SHARE * equiangular.pdf(t) + (1.0 - EQUIANGULAR_SHARE) * by_transmittance
 }
 
@@ -101,7 +106,44 @@ impl<'f, 'm> SegmentLight<'f, 'm> {
                 length,
                 depth / length.max(f32::MIN_POSITIVE),
             ),
+            taken: SmallVec::new(),
         })
+    }
+
+    /// Takes from the lights to sample those without extent that could bring much, and deals `probes` out to them in
+    /// proportion, for [`Shafts`](crate::shafts::Shafts).
+    ///
+    /// Returned are the lights and how many probes each gets. A light with a place gets half as many for its share: its
+    /// distances cost more, and its 1/r² leaves less of the ray where shadows matter. One that would get fewer than
+    /// 1.5 of them even were lights with extent counted in stays with the samples.
+    pub fn take_shafts<L: Lights>(
+        &mut self,
+        lights: &L,
+        probes: u32,
+    ) -> SmallVec<[(usize, u32); 4]> {
+        let points = || (0..lights.count()).filter(|&light| !lights.has_extent(light));
+        let all: f32 = points().map(|light| self.choice.pdf(light)).sum();
+        let taken: SmallVec<[(usize, u32); 4]> = points()
+            .filter_map(|light| {
+                let probes = match lights.pivot(light) {
+                    Some(_) => 0.5 * probes as f32,
+                    None => probes as f32,
+                };
+                let chance = self.choice.pdf(light);
+                (probes * chance >= LEAST_PROBES)
+                    .then(|| (light, (probes * chance / all).round() as u32))
+            })
+            .collect();
+        if !taken.is_empty() {
+            self.taken = taken.iter().map(|&(light, _)| light).collect();
+            self.choice = self.choice.without(&self.taken);
+        }
+        taken
+    }
+
+    /// Whether lights are left for [`SegmentLight::sample`].
+    pub fn has_lights<L: Lights>(&self, lights: &L) -> bool {
+        self.taken.len() < lights.count()
     }
 
     /// The ray the segment lies on.
@@ -136,6 +178,9 @@ impl<'f, 'm> SegmentLight<'f, 'm> {
         w: [f32; 2],
     ) -> Option<SegmentSample<'m>> {
         let (light, chance) = self.choice.sample(u)?;
+        if self.taken.contains(&light) {
+            return None;
+        }
         let (start, end) = self.flight.segment().range();
         let equiangular = world
             .lights
@@ -150,31 +195,66 @@ impl<'f, 'm> SegmentLight<'f, 'm> {
                 .sample_inside((v - EQUIANGULAR_SHARE) / (1.0 - EQUIANGULAR_SHARE))?,
             None => self.flight.sample_inside(v)?,
         };
-        let stop = self.flight.stop(t);
-        if stop.transmittance.max_element() <= 0.0 {
-            return None;
-        }
-        let by_transmittance = self.flight.pdf_inside(&stop);
+        let scattered = Scattered::at(world, &self.ray, self.flight, t, light, w)?;
+        let by_transmittance = self.flight.pdf_inside(&scattered.stop);
         let distance_pdf = equiangular
             .as_ref()
             .map_or(by_transmittance, |e| mixed(e, t, by_transmittance));
-        let x = self.ray.at(t);
-        let medium = world.media.at(x);
-        let sample = world.lights.sample(light, x, w)?;
-        let scattering = medium.scattering(-self.ray.direction, sample.w_i);
-        let pdf = chance * distance_pdf * sample.pdf;
-        let value = stop.transmittance * scattering * sample.radiance / pdf;
-        if !value.is_finite() || value.max_element() <= 0.0 {
-            return None;
-        }
-        let arrives = unoccluded(world, x, x, &sample)?;
+        let pdf = chance * distance_pdf * scattered.light.pdf;
+        let value = scattered.over(pdf)?;
+        let arrives = unoccluded(world, scattered.x, scattered.x, &scattered.light)?;
         Some(SegmentSample {
-            stop,
+            stop: scattered.stop,
             value: value * arrives,
-            medium,
-            light: sample,
+            medium: scattered.medium,
+            light: scattered.light,
             pdf,
         })
+    }
+}
+
+/// Light that is on its way to a point of a ray and scattered there towards the ray's origin, should nothing stand between.
+#[derive(Clone, Debug)]
+pub(crate) struct Scattered<'m> {
+    pub(crate) stop: Stop,
+    pub(crate) x: Vec3,
+    pub(crate) medium: MediumPoint<'m>,
+    pub(crate) light: LightSample,
+    /// T σs p L.
+    flux: Vec3,
+}
+
+impl<'m> Scattered<'m> {
+    /// At distance `t`, along the direction that `w` picks towards `light`.
+    pub(crate) fn at<G: Geometry, L: Lights>(
+        world: &World<'m, G, L>,
+        ray: &Ray,
+        flight: &FreeFlight<'m>,
+        t: f32,
+        light: usize,
+        w: [f32; 2],
+    ) -> Option<Self> {
+        let stop = flight.stop(t);
+        if stop.transmittance.max_element() <= 0.0 {
+            return None;
+        }
+        let x = ray.at(t);
+        let medium = world.media.at(x);
+        let light = world.lights.sample(light, x, w)?;
+        let scattering = medium.scattering(-ray.direction, light.w_i);
+        Some(Self {
+            flux: stop.transmittance * scattering * light.radiance,
+            stop,
+            x,
+            medium,
+            light,
+        })
+    }
+
+    /// T σs p L over a density; `None` where it is zero or not a number.
+    pub(crate) fn over(&self, pdf: f32) -> Option<Vec3> {
+        let value = self.flux / pdf;
+        (value.is_finite() && value.max_element() > 0.0).then_some(value)
     }
 }
 

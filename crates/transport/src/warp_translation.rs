@@ -88,6 +88,14 @@ impl<'m> WarpVisitor<'m> {
         }
     }
 
+    /// As [`WarpVisitor::new`] on a surface with the unit `normal`: light is weighted by the cosine, and the point moves in the
+    /// surface's plane.
+    pub(crate) fn on_surface(media: &'m Media, center: Vec3, radius: f32, normal: Vec3) -> Self {
+        let mut visitor = Self::new(media, center, radius, None);
+        visitor.last.normal = Some(normal);
+        visitor
+    }
+
     /// Notes light that set out at `distance` along the first stretch.
     fn arrive(&mut self, distance: f32, value: Vec3) {
         match self.arrivals.last_mut() {
@@ -243,6 +251,11 @@ impl Visitor for WarpVisitor<'_> {
         };
         match source {
             Source::Medium => {}
+            Source::Scattered(log_light) => {
+                for (sum, light) in log_gradient.iter_mut().zip(log_light) {
+                    *sum += light * from.alpha;
+                }
+            }
             Source::Point(position, normal) => {
                 let light = End {
                     position,

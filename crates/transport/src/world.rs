@@ -59,6 +59,12 @@ pub trait Lights: Sync {
     /// The point around which a finite light gathers; `None` for lights infinitely far away.
     fn pivot(&self, light: usize) -> Option<Vec3>;
 
+    /// Whether `light` shines from more than one point or direction. Its samples are [`LightSample::delta`] where not, all of
+    /// them alike; true is safe.
+    fn has_extent(&self, _light: usize) -> bool {
+        true
+    }
+
     /// Samples a direction from `p` towards `light`.
     fn sample(&self, light: usize, p: Vec3, u: [f32; 2]) -> Option<LightSample>;
 

@@ -4,24 +4,31 @@
 //! surfaces; each scene pays only for what it holds.
 
 use super::counted::Counted;
+use super::fill::media::{self, MediaCache};
+use super::fill::surfaces::{self, SurfaceCache};
 use crate::film::Pixel;
 use glam::Vec3;
 use std::cell::Cell;
-use tyndall_cache::Cache;
 use tyndall_math::{Ray, Sampler};
 use tyndall_scene::{LightSet, Scene};
-use tyndall_transport::emission;
 use tyndall_transport::free_flight::FreeFlight;
 use tyndall_transport::gather;
 use tyndall_transport::layers::LayerVisitor;
-use tyndall_transport::path::{FirstEvent, Start, trace};
+use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
+use tyndall_transport::shafts::Shafts;
 use tyndall_transport::single::SegmentLight;
 use tyndall_transport::world::{Geometry, SurfaceHit, World};
+use tyndall_transport::{direct, emission};
 
-/// Single-scattering samples along each camera ray of the cached integrator.
+/// Probes along each camera ray for the shadows of lights without extent. In the hall (2026-11) the error of its shafts
+/// falls faster with them than the time grows, up to here.
+const SHAFT_PROBES: u32 = 24;
+/// Single-scattering samples along each camera ray of the cached integrator, for all other light.
 const SINGLE_SAMPLES: u32 = 2;
 /// Lookups of multiple scattering along each camera ray.
 const MULTIPLE_SAMPLES: u32 = 4;
+/// Where no record is valid the nearest one stands in, within this share of the distance to the eye.
+const MAKESHIFT: f32 = 0.05;
 /// Parts of a camera sample's work beside the path behind the first surface; each has numbers of its own.
 const FOG_PART: u64 = 1;
 const PATHS_PART: u64 = 2;
@@ -36,16 +43,23 @@ pub(crate) enum Multiple<'c> {
     /// There is none.
     None,
     /// Interpolated from records.
-    Records(&'c Cache<3>),
+    Records(&'c MediaCache),
     /// Path traced.
     Paths,
+}
+
+/// What was computed before the image.
+pub(crate) struct Known<'c> {
+    pub(crate) multiple: Multiple<'c>,
+    /// Indirect light on surfaces, where records hold it.
+    pub(crate) indirect: Option<&'c SurfaceCache>,
 }
 
 /// Computes camera samples of one scene; one for each row of the image.
 pub(crate) struct Camera<'s> {
     scene: &'s Scene,
     frame: [u32; 2],
-    max_depth: Option<u32>,
+    reach: Reach<'s>,
     geometry: Counted<'s>,
     lookups: Cell<u64>,
     missed: Cell<u64>,
@@ -71,11 +85,11 @@ impl Tally {
 }
 
 impl<'s> Camera<'s> {
-    pub(crate) fn new(scene: &'s Scene, frame: [u32; 2], max_depth: Option<u32>) -> Self {
+    pub(crate) fn new(scene: &'s Scene, frame: [u32; 2], reach: Reach<'s>) -> Self {
         Self {
             scene,
             frame,
-            max_depth,
+            reach,
             geometry: Counted::new(scene),
             lookups: Cell::new(0),
             missed: Cell::new(0),
@@ -99,7 +113,7 @@ impl<'s> Camera<'s> {
     }
 
     fn may_scatter(&self, events: u32) -> bool {
-        self.max_depth.is_none_or(|max| events <= max)
+        self.reach.max_depth.is_none_or(|max| events <= max)
     }
 
     /// A path-traced sample of pixel (x, y).
@@ -111,7 +125,7 @@ impl<'s> Camera<'s> {
             ray,
             hit: Some(hit),
             first: FirstEvent::Any,
-            max_depth: self.max_depth,
+            reach: Reach::depth(self.reach.max_depth),
         };
         let mut visitor = LayerVisitor::default();
         trace(&world, &start, sampler, &mut visitor);
@@ -128,21 +142,15 @@ impl<'s> Camera<'s> {
         }
     }
 
-    /// A sample of pixel (x, y) with multiple scattering found as `multiple` says.
-    pub(crate) fn cached(
-        &self,
-        x: u32,
-        y: u32,
-        sampler: &mut Sampler,
-        multiple: &Multiple<'_>,
-    ) -> Pixel {
+    /// A sample of pixel (x, y) with what is `known` read, and the rest traced.
+    pub(crate) fn cached(&self, x: u32, y: u32, sampler: &mut Sampler, known: &Known<'_>) -> Pixel {
         let world = self.geometry.world(self.scene);
         let ray = self.ray(x, y, sampler);
         let hit = world.geometry.intersect(&ray, f32::INFINITY);
         let t_max = hit.map_or(f32::INFINITY, |h| h.t);
         let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
         let mut pixel = Pixel {
-            surface: self.traced(&ray, hit, FirstEvent::Surface, sampler).surface,
+            surface: self.surface(&world, (&ray, hit), &flight, known, sampler),
             transmittance: flight.transmittance(),
             depth: hit.map_or(0.0, |h| h.t),
             ..Pixel::default()
@@ -162,7 +170,7 @@ impl<'s> Camera<'s> {
             pixel.single = self.single(&world, &ray, &flight, sampler);
         }
         if self.may_scatter(least_multiple_depth(self.scene)) {
-            match multiple {
+            match known.multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
                     pixel.multiple = self.interpolated(&world, &ray, &flight, cache, sampler);
@@ -177,6 +185,31 @@ impl<'s> Camera<'s> {
         pixel
     }
 
+    /// What the first surface sends to the eye, or the environment.
+    fn surface<'w>(
+        &self,
+        world: &World<'w, Counted<'_>, LightSet>,
+        (ray, hit): (&Ray, Option<SurfaceHit>),
+        flight: &FreeFlight<'w>,
+        known: &Known<'_>,
+        sampler: &mut Sampler,
+    ) -> Vec3 {
+        let read = known.indirect.zip(hit).and_then(|(cache, hit)| {
+            let normal = hit.bsdf.normal();
+            let lambert = hit.bsdf.is_lambert();
+            let indirect = lambert.then(|| surfaces::lookup(cache, hit.position, normal))??;
+            Some((hit, indirect))
+        });
+        let Some((hit, indirect)) = read else {
+            return self.traced(ray, hit, FirstEvent::Surface, sampler).surface;
+        };
+        let w_o = -ray.direction;
+        let choice = sampler.next_1d();
+        let direct = direct::on_surface(world, &hit, choice, sampler.next_2d())
+            .map_or(Vec3::ZERO, |s| hit.bsdf.eval(w_o, s.w_i) * s.radiance);
+        flight.transmittance() * (hit.emission + direct + hit.bsdf.albedo(w_o) * indirect)
+    }
+
     fn traced(
         &self,
         ray: &Ray,
@@ -188,7 +221,7 @@ impl<'s> Camera<'s> {
             ray: *ray,
             hit: Some(hit),
             first,
-            max_depth: self.max_depth,
+            reach: self.reach,
         };
         let mut visitor = LayerVisitor::default();
         trace(
@@ -207,9 +240,17 @@ impl<'s> Camera<'s> {
         flight: &FreeFlight<'w>,
         sampler: &mut Sampler,
     ) -> Vec3 {
-        let Some(lights) = SegmentLight::new(world, ray, flight) else {
+        let Some(mut lights) = SegmentLight::new(world, ray, flight) else {
             return Vec3::ZERO;
         };
+        let mut shafts = Vec3::ZERO;
+        for (light, probes) in lights.take_shafts(world.lights, SHAFT_PROBES) {
+            let shaft = Shafts::new(world, ray, flight, light);
+            shafts += shaft.radiance(probes, sampler.next_1d());
+        }
+        if !lights.has_lights(world.lights) {
+            return shafts;
+        }
         let mut sum = Vec3::ZERO;
         // One offset for all samples of the ray: their distances are evenly spread.
         let offset = sampler.next_1d();
@@ -221,7 +262,7 @@ impl<'s> Camera<'s> {
                 sum += s.value;
             }
         }
-        sum / SINGLE_SAMPLES as f32
+        shafts + sum / SINGLE_SAMPLES as f32
     }
 
     fn interpolated<'w>(
@@ -229,7 +270,7 @@ impl<'s> Camera<'s> {
         world: &World<'w, Counted<'_>, LightSet>,
         ray: &Ray,
         flight: &FreeFlight<'w>,
-        cache: &Cache<3>,
+        cache: &MediaCache,
         sampler: &mut Sampler,
     ) -> Vec3 {
         let media = &self.scene.media;
@@ -243,15 +284,14 @@ impl<'s> Camera<'s> {
             };
             let x = ray.at(t);
             looked += 1;
-            let radiance = cache.lookup(x).map_or_else(
-                || {
-                    // No record is valid here: one path stands in, with noise and without the bias of a record too far.
-                    missed += 1;
+            let radiance = media::lookup(cache, x).unwrap_or_else(|| {
+                missed += 1;
+                // The nearest record is a little off here, and a path would be noisy.
+                media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| {
                     let mut path = sampler.branch(u64::from(i));
-                    gather::one(world, x, self.max_depth, &mut path)
-                },
-                Vec3::from,
-            );
+                    gather::one(world, x, self.reach, &mut path)
+                })
+            });
             let stop = flight.stop(t);
             sum += stop.transmittance * media.at(x).sigma_s * radiance / flight.pdf_inside(&stop);
         }

@@ -15,6 +15,7 @@ use std::time::Instant;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::Scene;
+use tyndall_transport::path::Reach;
 
 /// Most pixels evaluated.
 const MOST_PIXELS: usize = 1024;
@@ -124,7 +125,7 @@ impl Estimate<'_> {
 
     /// Evaluates the pixel in column and row `place`, whose value in the image is `x`, twice.
     fn term(&self, i: usize, place: [u32; 2], x: DVec3, w: DVec3, samples: u64) -> Term {
-        let camera = Camera::new(self.scene, self.frame, self.max_depth);
+        let camera = Camera::new(self.scene, self.frame, Reach::depth(self.max_depth));
         let [column, row] = place;
         let evaluate = |half: u64| {
             let key = self.key(2 * i as u64 + half);

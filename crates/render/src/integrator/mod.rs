@@ -5,6 +5,7 @@
 mod camera;
 mod counted;
 mod estimate;
+mod field;
 mod fill;
 
 use crate::error::RenderError;
@@ -13,19 +14,25 @@ use crate::image::Image;
 use crate::layers::LayerSet;
 use crate::options::{Crop, Depth, Integrator, Phase, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
-use camera::{Camera, Multiple, Tally, least_multiple_depth};
+use camera::{Camera, Known, Multiple, Tally, least_multiple_depth};
 use estimate::Estimate;
-use fill::{Fill, Filled};
+use field::FilledField;
+use fill::media::Media;
+use fill::surfaces::Surfaces;
+use fill::{Fill, Filled, Kind};
 use glam::Vec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::{FilmSize, Scene};
+use tyndall_transport::path::Reach;
 use tyndall_transport::world::Lights;
 
 /// Samples per pixel before the noise is believed.
-const FIRST_SAMPLES: u32 = 16;
+const FIRST_SAMPLES: u32 = 8;
+/// By how much the samples of a pixel may grow at once: what few samples tell of noise may be far off.
+const GROWTH: u32 = 4;
 /// Samples per pixel at which a render ends even if its error is not met.
 const MOST_SAMPLES: u32 = 1 << 20;
 /// Share of the target error that noise may take when records are interpolated; the rest is left to interpolation
@@ -33,6 +40,7 @@ const MOST_SAMPLES: u32 = 1 << 20;
 const NOISE_SHARE: f64 = 0.8;
 
 /// Shares of a time limit after which the fill and the samples end; the rest goes to the estimate of the error.
+const FIELD_DEADLINE: f64 = 0.2;
 const FILL_DEADLINE: f64 = 0.4;
 const RENDER_DEADLINE: f64 = 0.8;
 
@@ -138,22 +146,57 @@ impl<'s> Run<'s> {
         let mut film = Film::new(self.frame, self.crop, layers)?;
 
         let way = self.way(&mut notes);
-        let filled = (way == Way::Records).then(|| self.fill());
-        let cut_short = filled.as_ref().is_some_and(|filled| filled.cut_short);
+        let field = self.has_field(way).then(|| self.field());
+        let reach = Reach {
+            max_depth: self.max_depth,
+            field: field.as_ref().map(|filled| &filled.field),
+        };
+        let filled = (way == Way::Records).then(|| {
+            self.fill(Media::new(
+                self.scene,
+                self.frame,
+                reach,
+                self.options.seed,
+                self.error,
+            ))
+        });
+        let indirect = self.has_surface_records(way).then(|| {
+            self.fill(Surfaces {
+                scene: self.scene,
+                frame: self.frame,
+                reach,
+                seed: self.options.seed,
+                error: self.error,
+            })
+        });
+        let cut_short = filled.as_ref().is_some_and(|filled| filled.cut_short)
+            || indirect.as_ref().is_some_and(|filled| filled.cut_short)
+            || field.as_ref().is_some_and(|filled| filled.cut_short);
+        if let Some(filled) = &field {
+            stats.rays += filled.rays;
+        }
         if let Some(filled) = &filled {
             stats.rays += filled.rays;
             let count = filled.cache.len() as u64;
             stats.records.insert("multiple".to_owned(), count);
         }
+        if let Some(filled) = &indirect {
+            stats.rays += filled.rays;
+            let count = filled.cache.len() as u64;
+            stats.records.insert("surface".to_owned(), count);
+        }
         stats.fill_s = self.start.elapsed().as_secs_f64();
 
         let rendering = Instant::now();
-        let multiple = match (&filled, way) {
-            (Some(filled), _) => Multiple::Records(&filled.cache),
-            (None, Way::Paths) => Multiple::Paths,
-            (None, _) => Multiple::None,
+        let known = Known {
+            multiple: match (&filled, way) {
+                (Some(filled), _) => Multiple::Records(&filled.cache),
+                (None, Way::Paths) => Multiple::Paths,
+                (None, _) => Multiple::None,
+            },
+            indirect: indirect.as_ref().map(|filled| &filled.cache),
         };
-        let (tally, timed_out) = self.sample(&mut film, &multiple);
+        let (tally, timed_out) = self.sample(&mut film, &known, reach);
         stats.spp = film.mean_samples();
         film.fill_gaps();
         stats.render_s = rendering.elapsed().as_secs_f64();
@@ -202,8 +245,9 @@ impl<'s> Run<'s> {
             Way::PathIntegrator => "integrator: path".to_owned(),
             Way::NoMultiple => "records: none; single: direct; SH: off".to_owned(),
             Way::Records => format!(
-                "records: {} multiple; single: direct; SH: off",
-                grouped(stats.records["multiple"])
+                "records: {} multiple, {} surface; single: direct; SH: off",
+                grouped(stats.records["multiple"]),
+                grouped(stats.records.get("surface").copied().unwrap_or(0))
             ),
             Way::Paths => {
                 "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
@@ -248,103 +292,135 @@ impl<'s> Run<'s> {
         }
     }
 
-    /// Fills the cache for the whole frame, whatever the crop, so that a crop shows the pixels of the full image.
-    fn fill(&self) -> Filled {
+    /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
+    fn has_field(&self, way: Way) -> bool {
+        way != Way::PathIntegrator
+            && self.max_depth.is_none()
+            && self.scene.media.is_isotropic()
+            && (way == Way::Records || !self.scene.geometry.is_empty())
+    }
+
+    /// Whether indirect light on surfaces is read from records: where paths of these can end in a field.
+    fn has_surface_records(&self, way: Way) -> bool {
+        self.has_field(way) && !self.scene.geometry.is_empty()
+    }
+
+    fn field(&self) -> FilledField {
+        field::fill(
+            self.scene,
+            self.frame,
+            self.options.seed,
+            self.error,
+            self.deadline(FIELD_DEADLINE),
+            self.progress,
+        )
+    }
+
+    /// Fills a cache for the whole frame, whatever the crop, so that a crop shows the pixels of the full image.
+    fn fill<K: Kind>(&self, kind: K) -> Filled<K::Tag> {
         let fill = Fill {
+            kind,
             scene: self.scene,
             frame: self.frame,
-            max_depth: self.max_depth,
             seed: self.options.seed,
-            error: self.error,
-            pattern: fill::pattern(self.error),
             deadline: self.deadline(FILL_DEADLINE),
         };
         fill.run(self.progress)
     }
 
     /// Takes samples in passes until the samples or the error asked for are reached, or the time is up.
-    fn sample(&self, film: &mut Film, multiple: &Multiple<'_>) -> (Tally, bool) {
+    fn sample(&self, film: &mut Film, known: &Known<'_>, reach: Reach<'_>) -> (Tally, bool) {
         let mut tally = Tally::default();
-        let mut taken = 0;
         let target = match self.options.integrator {
             Integrator::Path => f64::from(self.error),
             Integrator::Cache => f64::from(self.error) * NOISE_SHARE,
         };
-        let mut goal = self.options.spp.unwrap_or(FIRST_SAMPLES);
+        let pixels = (self.crop.width * self.crop.height) as usize;
+        let mut goals = vec![self.options.spp.unwrap_or(FIRST_SAMPLES); pixels];
         loop {
             // A pass ends within about a second on common scenes, so that a time limit is kept.
-            let until = goal.min(taken + pass_length(taken));
-            let (pass, complete) = self.pass(film, taken..until, goal, multiple);
-            tally.add(&pass);
+            let (pass, complete) = self.pass(film, &goals, known, reach);
+            tally.add(&pass.tally);
             if !complete {
                 return (tally, true);
             }
-            taken = until;
-            if taken < goal {
+            if pass.short_of_goals {
                 continue;
             }
-            if self.options.spp.is_some() || taken >= MOST_SAMPLES {
+            let mean_samples = film.mean_samples();
+            if self.options.spp.is_some() || mean_samples >= f64::from(MOST_SAMPLES) {
                 return (tally, false);
             }
-            let Some(error) = film.relative_error() else {
+            match film.relative_error() {
+                Some(error) if error > target => {}
+                _ => return (tally, false),
+            }
+            let Some(next) = film.goals(target, GROWTH) else {
                 return (tally, false);
             };
-            if error <= target {
-                return (tally, false);
-            }
-            // Noise falls with the root of the samples; aim at the goal, at most fourfold at once.
-            let factor = (error / target).powi(2).clamp(1.1, 4.0);
-            goal = ((f64::from(taken) * factor).ceil() as u32 + 1).min(MOST_SAMPLES) & !1;
+            goals = next;
         }
     }
 
-    /// Takes samples number `samples` of every pixel; false where time ran out before all rows were done.
+    /// Takes some samples of every pixel that is short of its goal; false where time ran out before all rows were done.
     fn pass(
         &self,
         film: &mut Film,
-        samples: std::ops::Range<u32>,
-        goal: u32,
-        multiple: &Multiple<'_>,
-    ) -> (Tally, bool) {
-        let rows_done = AtomicUsize::new(0);
+        goals: &[u32],
+        known: &Known<'_>,
+        reach: Reach<'_>,
+    ) -> (Pass, bool) {
+        let wanted: u64 = goals.iter().map(|&goal| u64::from(goal)).sum();
+        let had = film.mean_samples() * goals.len() as f64;
+        let is_first = had == 0.0;
+        let added = AtomicU64::new(0);
         let mut rows = film.rows();
-        let n_rows = rows.len();
         // From coarse to fine over the image, so that rows which time leaves out stand between others. The first is always taken.
         rows.sort_by_key(|row| (row.y - self.crop.y).reverse_bits());
-        let tallies: Vec<Option<Tally>> = rows
+        let passes: Vec<Option<Pass>> = rows
             .par_iter_mut()
             .with_max_len(1)
             .map(|row| {
-                if self.out_of_time() && (samples.start > 0 || row.y > self.crop.y) {
+                if self.out_of_time() && (!is_first || row.y > self.crop.y) {
                     return None;
                 }
-                let tally = self.row(row, samples.clone(), multiple);
-                let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
-                let in_pass = done as f32 / n_rows as f32 * samples.len() as f32;
-                let fraction = (samples.start as f32 + in_pass) / goal as f32;
-                self.progress.update(Phase::Render, fraction, 0);
-                Some(tally)
+                let first = (row.y - self.crop.y) as usize * self.crop.width as usize;
+                let goals = &goals[first..first + self.crop.width as usize];
+                let (pass, samples) = self.row(row, goals, known, reach);
+                let added = added.fetch_add(samples, Ordering::Relaxed) + samples;
+                let fraction = (had + added as f64) / wanted.max(1) as f64;
+                self.progress.update(Phase::Render, fraction as f32, 0);
+                Some(pass)
             })
             .collect();
-        let complete = tallies.iter().all(Option::is_some);
-        let mut sum = Tally::default();
-        for tally in tallies.iter().flatten() {
-            sum.add(tally);
+        let complete = passes.iter().all(Option::is_some);
+        let mut sum = Pass::default();
+        for pass in passes.iter().flatten() {
+            sum.tally.add(&pass.tally);
+            sum.short_of_goals |= pass.short_of_goals;
         }
         (sum, complete)
     }
 
+    /// Takes samples of one row; tells how many, too.
     fn row(
         &self,
         row: &mut FilmRow<'_>,
-        samples: std::ops::Range<u32>,
-        multiple: &Multiple<'_>,
-    ) -> Tally {
-        let camera = Camera::new(self.scene, self.frame, self.max_depth);
+        goals: &[u32],
+        known: &Known<'_>,
+        reach: Reach<'_>,
+    ) -> (Pass, u64) {
+        let camera = Camera::new(self.scene, self.frame, reach);
         let mut dropped = 0;
-        for x in row.columns() {
+        let mut samples = 0;
+        let mut short_of_goals = false;
+        for (x, &goal) in row.columns().zip(goals) {
             let pixel = u64::from(row.y) * u64::from(self.frame[0]) + u64::from(x);
-            for sample in samples.clone() {
+            let taken = row.taken(x);
+            let until = goal.min(taken + pass_length(taken));
+            short_of_goals |= until < goal;
+            samples += u64::from(until - taken);
+            for sample in taken..until {
                 // The film's halves are independent sequences, each stratified in itself.
                 let key = Key {
                     seed: self.options.seed,
@@ -354,7 +430,7 @@ impl<'s> Run<'s> {
                 let mut sampler = Sampler::new(key, u64::from(sample >> 1));
                 let value = match self.options.integrator {
                     Integrator::Path => camera.path_traced(x, row.y, &mut sampler),
-                    Integrator::Cache => camera.cached(x, row.y, &mut sampler, multiple),
+                    Integrator::Cache => camera.cached(x, row.y, &mut sampler, known),
                 };
                 match finite(value) {
                     Some(value) => row.add(x, sample, &value),
@@ -365,11 +441,24 @@ impl<'s> Run<'s> {
                 }
             }
         }
-        Tally {
+        let tally = Tally {
             dropped,
             ..camera.tally()
-        }
+        };
+        let pass = Pass {
+            tally,
+            short_of_goals,
+        };
+        (pass, samples)
     }
+}
+
+/// What a pass over the image came to.
+#[derive(Default)]
+struct Pass {
+    tally: Tally,
+    /// Whether some pixels have fewer samples than they should.
+    short_of_goals: bool,
 }
 
 /// How multiple scattering in media is computed.

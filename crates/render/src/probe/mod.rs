@@ -16,6 +16,7 @@ use tyndall_scene::Scene;
 use tyndall_transport::Lights;
 use tyndall_transport::gather::{self, GatherPattern};
 use tyndall_transport::inscatter::{self, Inscattered, Order};
+use tyndall_transport::path::Reach;
 
 /// What to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +158,7 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
                 towards,
                 &GatherPattern::new(samples),
                 options.derivatives,
-                max_depth,
+                Reach::depth(max_depth),
                 key,
             );
             let multiple = Part {

@@ -9,6 +9,7 @@ use tyndall_math::{Key, Ray, Sampler};
 use tyndall_transport::batches::in_batches;
 use tyndall_transport::gather::{self, GatherDirections};
 use tyndall_transport::inscatter::Inscatter;
+use tyndall_transport::path::Reach;
 use tyndall_transport::{Geometry, Lights, World};
 
 /// The step of the differences as a share of the length over which light changes: its square is their relative error.
@@ -126,7 +127,7 @@ impl<'w, 'm, G: Geometry, L: Lights> Place<'w, 'm, G, L> {
             &self.directions,
             self.world,
             self.x,
-            self.max_depth,
+            Reach::depth(self.max_depth),
             &mut sampler,
         );
         [self.point.value(key, i), multiple]

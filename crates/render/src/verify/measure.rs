@@ -10,7 +10,7 @@ use tyndall_math::{Key, Purpose, Ray, Sampler};
 use tyndall_transport::gather::{self, Derivatives, GatherPattern};
 use tyndall_transport::inscatter::{self, Order};
 use tyndall_transport::layers::LayerVisitor;
-use tyndall_transport::path::{FirstEvent, Start, trace};
+use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
 
 /// The world of the benchmarks.
 pub(super) type World<'a> = tyndall_transport::World<'a, Solids, Lamps>;
@@ -96,7 +96,7 @@ pub(super) fn pixel(
                     ray: ray(sampler.next_2d()),
                     hit: None,
                     first: FirstEvent::Any,
-                    max_depth,
+                    reach: Reach::depth(max_depth),
                 };
                 let mut visitor = LayerVisitor::default();
                 trace(world, &start, &mut sampler, &mut visitor);
@@ -217,7 +217,7 @@ fn measure(
             point.towards,
             pattern,
             Derivatives::Aware,
-            None,
+            Reach::default(),
             key,
         );
         add(g.value, g.gradient);

@@ -227,6 +227,13 @@ impl Lights for LightSet {
         self.lights[light].pivot()
     }
 
+    fn has_extent(&self, light: usize) -> bool {
+        match &self.lights[light] {
+            Light::Point(_) | Light::Spot(_) | Light::Directional(_) => false,
+            Light::Triangle(_) | Light::Quad(_) | Light::Sky(_) | Light::Environment(_) => true,
+        }
+    }
+
     fn sample(&self, light: usize, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
         self.lights[light].sample(p, u)
     }

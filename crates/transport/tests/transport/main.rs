@@ -6,8 +6,10 @@
 )]
 
 mod exact;
+mod field;
 mod inscatter;
 mod rig;
 mod samplers;
 mod second_order;
+mod shafts;
 mod stage;

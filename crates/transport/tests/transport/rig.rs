@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
 use tyndall_media::{Media, Medium, MediumParams, PhaseFunction, Region};
 use tyndall_transport::layers::{LayerVisitor, Layers};
-use tyndall_transport::path::{FirstEvent, Start, trace};
+use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
 use tyndall_transport::{Bsdf, Geometry, LightSample, Lights, SurfaceHit, World};
 
 /// Nothing, or the inside of a Lambertian sphere around the origin.
@@ -103,6 +103,10 @@ impl Lights for Lamps {
         self.points.get(light).map(|(q, _)| *q)
     }
 
+    fn has_extent(&self, light: usize) -> bool {
+        light >= self.points.len()
+    }
+
     fn sample(&self, light: usize, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
         Some(match self.points.get(light) {
             Some((q, intensity)) => {
@@ -189,7 +193,7 @@ pub(crate) fn pixel(
             ray,
             hit: None,
             first: FirstEvent::Any,
-            max_depth,
+            reach: Reach::depth(max_depth),
         };
         trace(world, &start, &mut Sampler::new(key, 0), &mut visitor);
         sum.surface += visitor.layers.surface / n as f32;

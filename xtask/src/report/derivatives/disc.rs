@@ -276,6 +276,7 @@ mod tests {
     use tyndall_math::{Key, Purpose};
     use tyndall_transport::World;
     use tyndall_transport::gather::{GatherPattern, multiple};
+    use tyndall_transport::path::Reach;
 
     #[test]
     fn the_reference_is_what_a_long_gather_finds() {
@@ -294,7 +295,13 @@ mod tests {
                 media: &media,
             };
             for x in [DVec3::ZERO, DVec3::new(-0.1, 0.2, 0.1)] {
-                let found = multiple(&world, x.as_vec3(), &pattern, Some(source.depth()), key);
+                let found = multiple(
+                    &world,
+                    x.as_vec3(),
+                    &pattern,
+                    Reach::depth(Some(source.depth())),
+                    key,
+                );
                 let value = source.value(&disc, x);
                 // Five standard errors of 16 batches each: wrong alarms are rare, and the seed is fixed.
                 let off = (f64::from(found.value.x) - value).abs();

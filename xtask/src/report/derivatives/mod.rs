@@ -18,6 +18,7 @@ use tyndall_math::{Key, Purpose, Sampler, SphericalFibonacci};
 use tyndall_media::Media;
 use tyndall_transport::World;
 use tyndall_transport::gather::{Derivatives, GatherPattern, multiple_towards};
+use tyndall_transport::path::Reach;
 
 const DIRECTIONS: [u32; 6] = [256, 512, 1024, 2048, 4096, 8192];
 /// Gather points.
@@ -225,7 +226,15 @@ fn vacuum(quads: Quads, n: u32) -> Vec<f64> {
             let mut sampler = Sampler::new(key, 1);
             let strata = candidates::strata(&quads, x.as_dvec3(), n as usize, turn, &mut sampler);
             let aware = Derivatives::Aware;
-            let gathered = multiple_towards(&world, x, None, &rendered, aware, Some(2), key);
+            let gathered = multiple_towards(
+                &world,
+                x,
+                None,
+                &rendered,
+                aware,
+                Reach::depth(Some(2)),
+                key,
+            );
             let gradients = [
                 pattern.blind(&seen),
                 far_vertex,
@@ -269,8 +278,15 @@ fn fog(n: u32) -> Result<Vec<f64>> {
                 let key = trial(n, place, i);
                 let ways = [Derivatives::Blind, Derivatives::Aware];
                 for (error, derivatives) in errors.iter_mut().zip(ways) {
-                    let found =
-                        multiple_towards(&world, x, None, &pattern, derivatives, depth, key);
+                    let found = multiple_towards(
+                        &world,
+                        x,
+                        None,
+                        &pattern,
+                        derivatives,
+                        Reach::depth(depth),
+                        key,
+                    );
                     error.push_vector(found.gradient[0].as_dvec3(), exact);
                 }
             }

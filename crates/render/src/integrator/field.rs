@@ -1,0 +1,113 @@
+//! Fills the coarse field of light in which the paths of records and of surfaces end.
+//!
+//! Walks start along camera rays and are followed in batches: in parallel, while what they found is counted in their order, so that
+//! the field does not depend on the number of threads.
+
+use super::counted::Counted;
+use crate::options::{Phase, Progress};
+use rayon::prelude::*;
+use std::time::Instant;
+use tyndall_math::{Key, Purpose, Sampler};
+use tyndall_scene::Scene;
+use tyndall_transport::field::{CellWidths, Field, Filling, Found};
+
+/// Width of cells over their distance from the eye, at most; at least half of it.
+const WIDTH: f32 = 1.0 / 24.0;
+/// Light found at an error of 1: how much is asked for goes with the inverse square of the error.
+const FOUND_GAIN: f32 = 600.0;
+/// Least and most light found, counted by scatterings.
+const FOUND: [f32; 2] = [200_000.0, 10_000_000.0];
+/// Walks that may find too little before the filling ends, per scattering asked for: most rays may leave the scene at once.
+const WALKS_PER_FOUND: u64 = 2;
+/// Walks of one batch.
+const BATCH: u64 = 16_384;
+/// Walks that a thread follows in one piece.
+const PIECE: u64 = 256;
+
+/// A filled field and what it cost.
+pub(super) struct FilledField {
+    pub(super) field: Field,
+    pub(super) rays: u64,
+    /// Whether the deadline ended the filling.
+    pub(super) cut_short: bool,
+}
+
+/// Follows walks from the camera of `scene`, the more the smaller the `error` asked for.
+pub(super) fn fill(
+    scene: &Scene,
+    frame: [u32; 2],
+    seed: u64,
+    error: f32,
+    deadline: Option<Instant>,
+    progress: &dyn Progress,
+) -> FilledField {
+    let counted = Counted::new(scene);
+    let wanted = (FOUND_GAIN / (error * error)).clamp(FOUND[0], FOUND[1]) as u64;
+    let mut filling = Filling::new(CellWidths::around(
+        scene.camera.eye(),
+        WIDTH,
+        f32::MIN_POSITIVE,
+    ));
+    let (mut first, mut held) = (0, 0);
+    let mut cut_short = false;
+    while held < wanted && first < WALKS_PER_FOUND * wanted && !cut_short {
+        let last = first + BATCH;
+        let found: Vec<Found> = (first..last)
+            .step_by(PIECE as usize)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .flat_map_iter(|piece| {
+                let mut found = Vec::new();
+                for walk in piece..(piece + PIECE).min(last) {
+                    follow(scene, &counted, frame, seed, walk, &mut found);
+                }
+                found
+            })
+            .collect();
+        let cells = filling.place(&found);
+        let sides: Vec<Option<u32>> = found
+            .par_iter()
+            .zip(&cells)
+            .map(|(found, &cell)| filling.side(&counted, cell, found))
+            .collect();
+        for ((found, &cell), side) in found.iter().zip(&cells).zip(sides) {
+            filling.add(&counted, cell, side, found);
+        }
+        first = last;
+        held += found.len() as u64;
+        cut_short = deadline.is_some_and(|d| Instant::now() >= d);
+        progress.update(Phase::Fill, 0.2 * held as f32 / wanted as f32, 0);
+    }
+    let mut field = filling.end(&counted);
+    let surroundings = (0..field.len())
+        .into_par_iter()
+        .map(|cell| field.surroundings_of(&counted, cell))
+        .collect();
+    field.set_surroundings(surroundings);
+    FilledField {
+        field,
+        rays: counted.rays(),
+        cut_short,
+    }
+}
+
+/// Walk number `walk`, through a place in the frame of its own.
+fn follow(
+    scene: &Scene,
+    counted: &Counted<'_>,
+    frame: [u32; 2],
+    seed: u64,
+    walk: u64,
+    found: &mut Vec<Found>,
+) {
+    let key = Key {
+        seed,
+        purpose: Purpose::Field,
+        index: 0,
+    };
+    let mut sampler = Sampler::new(key, walk);
+    let [u, v] = sampler.next_2d();
+    let [w, h] = frame;
+    let ray = scene.camera.ray(u * w as f32, v * h as f32, w, h);
+    Filling::walk(&counted.world(scene), ray, &mut sampler, found);
+}

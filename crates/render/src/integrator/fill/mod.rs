@@ -1,0 +1,291 @@
+//! Fills a cache before the image is made, in media or on surfaces.
+//!
+//! Camera rays on a lattice that grows finer report points no record covers; these are thinned in a fixed order, computed
+//! in parallel and inserted together, so that the records do not depend on the number of threads.
+
+pub(super) mod media;
+pub(super) mod surfaces;
+
+use super::counted::Counted;
+use crate::options::{Phase, Progress};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+use tyndall_cache::{Cache, Record};
+use tyndall_math::{Key, Purpose, Ray, Sampler};
+use tyndall_scene::Scene;
+use tyndall_transport::gather::Gathered;
+
+/// Camera rays along the longer side of the frame on the first level; each level doubles them, at most to one per pixel.
+const FIRST_RAYS: u32 = 16;
+/// Levels end when no more than this share of a new level's points is found without a record: the camera pass then
+/// makes do with the nearest one.
+const GAPS_LEFT: f32 = 0.01;
+/// Rounds on one level: radii shrink when records come in, and open gaps that the next round closes.
+const ROUNDS: usize = 4;
+/// Accepted points of one round keep this share of a predicted radius between them.
+const SPACING: f32 = 0.7;
+/// Neighbouring radii may differ by this much per metre between them.
+const RADIUS_SLOPE: f32 = 1.0;
+
+/// Each attempt at a record takes this many times the rays of the one before.
+const MORE_RAYS: usize = 4;
+/// Attempts at a record: light from small bright places needs more rays than most.
+const ATTEMPTS: usize = 2;
+/// The noise of a record over the error asked for with which no further attempt is made. Told errors are conservative, and about six
+/// records blend at a point.
+const NOISE: f32 = 4.0;
+
+/// The first of some attempts, with ever more rays, whose noise is small for a target `error` of the image; else the last.
+fn quiet_enough(error: f32, gather: impl Fn(usize) -> Gathered) -> Gathered {
+    let mut attempt = 0;
+    loop {
+        let found = gather(attempt);
+        attempt += 1;
+        let noise = found.value_error.element_sum();
+        if attempt == ATTEMPTS || noise <= NOISE * error * found.value.element_sum() {
+            return found;
+        }
+    }
+}
+
+/// What records of one kind are, and where they are wanted.
+pub(super) trait Kind: Sync {
+    /// Where a record is valid within its ball.
+    type Tag: Clone + Send + Sync;
+
+    /// Largest radius of a record.
+    fn most_radius(&self) -> f32;
+
+    /// The points on a camera ray that ask for records.
+    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, visit: impl FnMut(Candidate));
+
+    /// Whether records are valid at a point.
+    fn covers(&self, cache: &Cache<3, Self::Tag>, candidate: &Candidate) -> bool;
+
+    /// The record at or near a point, with the random numbers of `index`; `None` where it would not be finite. In later rounds it must
+    /// cover the point.
+    fn record(
+        &self,
+        geometry: &Counted<'_>,
+        candidate: &Candidate,
+        index: u64,
+        round: usize,
+    ) -> Option<(Record<3>, Self::Tag)>;
+}
+
+/// What the fill has to achieve.
+pub(super) struct Fill<'s, K> {
+    pub(super) kind: K,
+    pub(super) scene: &'s Scene,
+    pub(super) frame: [u32; 2],
+    pub(super) seed: u64,
+    /// When to stop with what there is.
+    pub(super) deadline: Option<Instant>,
+}
+
+/// A filled cache.
+pub(super) struct Filled<T> {
+    pub(super) cache: Cache<3, T>,
+    /// The pixel through which each record was asked for: column and row.
+    pub(super) pixels: Vec<[u32; 2]>,
+    pub(super) rays: u64,
+    /// Whether the deadline ended the fill.
+    pub(super) cut_short: bool,
+}
+
+/// A point on a camera ray that asks for a record.
+#[derive(Clone, Copy)]
+pub(super) struct Candidate {
+    position: Vec3,
+    /// Unit normal on the viewer's side of a surface; zero in media.
+    normal: Vec3,
+    /// Size of a pixel there, in metres.
+    footprint: f32,
+    /// The camera ray.
+    ray: Ray,
+    /// Column and row of the pixel it is seen in.
+    pixel: [u32; 2],
+}
+
+/// Surfaces share records where the cosine between their normals is at least this.
+const SAME_SURFACE: f32 = 0.98;
+
+impl Candidate {
+    fn faces(&self, other: Vec3) -> bool {
+        self.normal == Vec3::ZERO || self.normal.dot(other) >= SAME_SURFACE
+    }
+}
+
+impl<K: Kind> Fill<'_, K> {
+    /// Computes the records the camera needs.
+    pub(super) fn run(&self, progress: &dyn Progress) -> Filled<K::Tag> {
+        let mut filled = Filled {
+            cache: Cache::tagged(),
+            pixels: Vec::new(),
+            rays: 0,
+            cut_short: false,
+        };
+        let strides = strides(self.frame);
+        for (level, &stride) in strides.iter().enumerate() {
+            for round in 0..ROUNDS {
+                let fraction = (level as f32 + round as f32 / ROUNDS as f32) / strides.len() as f32;
+                progress.update(Phase::Fill, fraction, filled.cache.len());
+                let (missing, share) = self.uncovered(&filled.cache, level as u64, stride);
+                if self.out_of_time() {
+                    filled.cut_short = true;
+                    return filled;
+                }
+                if missing.is_empty() || (round == 0 && share < GAPS_LEFT) {
+                    break;
+                }
+                let points = thin(&missing, &filled.cache, self.kind.most_radius());
+                if !self.compute(&mut filled, &points, round, progress, fraction) {
+                    break;
+                }
+            }
+        }
+        filled
+    }
+
+    /// Computes records at `points` and inserts them in order; false where the cache refused them.
+    fn compute(
+        &self,
+        filled: &mut Filled<K::Tag>,
+        points: &[Candidate],
+        round: usize,
+        progress: &dyn Progress,
+        fraction: f32,
+    ) -> bool {
+        let first = filled.cache.len();
+        let done = AtomicUsize::new(0);
+        let computed: Vec<_> = points
+            .par_iter()
+            .enumerate()
+            .map(|(i, point)| {
+                if self.out_of_time() {
+                    return (None, 0);
+                }
+                let geometry = Counted::new(self.scene);
+                let record = self
+                    .kind
+                    .record(&geometry, point, (first + i) as u64, round);
+                let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress.update(Phase::Fill, fraction, first + n);
+                (record, geometry.rays())
+            })
+            .collect();
+        filled.rays += computed.iter().map(|(_, n)| n).sum::<u64>();
+        let (records, seen): (Vec<_>, Vec<_>) = computed
+            .into_iter()
+            .zip(points)
+            .filter_map(|((record, _), point)| Some((record?, point.pixel)))
+            .unzip();
+        let cache = &mut filled.cache;
+        let kept = cache
+            .insert_tagged(records)
+            .and_then(|()| cache.clamp_radii(RADIUS_SLOPE));
+        debug_assert!(kept.is_ok(), "{kept:?}");
+        if kept.is_ok() {
+            filled.pixels.extend(seen);
+        }
+        kept.is_ok()
+    }
+
+    fn out_of_time(&self) -> bool {
+        self.deadline.is_some_and(|d| Instant::now() >= d)
+    }
+
+    /// Points on the camera rays of one level that no record covers, in a fixed order, and their share of all points.
+    fn uncovered(
+        &self,
+        cache: &Cache<3, K::Tag>,
+        level: u64,
+        stride: u32,
+    ) -> (Vec<Candidate>, f32) {
+        let [w, h] = self.frame;
+        let rows: Vec<u32> = (0..h).step_by(stride as usize).collect();
+        let found: Vec<(Vec<Candidate>, usize)> = rows
+            .par_iter()
+            .map(|&y| {
+                let (mut row, mut points) = (Vec::new(), 0);
+                for x in (0..w).step_by(stride as usize) {
+                    let index = (level << 40) | (u64::from(y) * u64::from(w) + u64::from(x));
+                    let key = Key {
+                        seed: self.seed,
+                        purpose: Purpose::Placement,
+                        index,
+                    };
+                    let mut sampler = Sampler::new(key, 0);
+                    let [u, v] = sampler.next_2d();
+                    let ray = self.scene.camera.ray(
+                        (x as f32 + u * stride as f32).min(w as f32),
+                        (y as f32 + v * stride as f32).min(h as f32),
+                        w,
+                        h,
+                    );
+                    let offset = sampler.next_1d();
+                    self.kind.points_on(&ray, [x, y], offset, |candidate| {
+                        points += 1;
+                        if !self.kind.covers(cache, &candidate) {
+                            row.push(candidate);
+                        }
+                    });
+                }
+                (row, points)
+            })
+            .collect();
+        let points: usize = found.iter().map(|(_, n)| n).sum();
+        let missing: Vec<Candidate> = found.into_iter().flat_map(|(row, _)| row).collect();
+        let share = missing.len() as f32 / points.max(1) as f32;
+        (missing, share)
+    }
+}
+
+/// Pixels between the camera rays of each level, coarse to fine, the last one 1.
+fn strides(frame: [u32; 2]) -> Vec<u32> {
+    let longest = frame[0].max(frame[1]);
+    let first = (longest / FIRST_RAYS).max(1);
+    (0..=first.ilog2()).rev().map(|level| 1 << level).collect()
+}
+
+/// Drops candidates that an earlier one will probably cover; keeps their order.
+fn thin<T: Clone>(
+    candidates: &[Candidate],
+    cache: &Cache<3, T>,
+    most_radius: f32,
+) -> Vec<Candidate> {
+    let mut grid: HashMap<[i32; 3], Vec<(Candidate, f32)>> = HashMap::new();
+    let mut kept = Vec::new();
+    for c in candidates {
+        let mut radius = most_radius;
+        cache.for_each_near(c.position, radius, |_, r| {
+            radius = radius.min(r.radius + RADIUS_SLOPE * r.position.distance(c.position));
+        });
+        let key = (c.position / most_radius).floor().as_ivec3().to_array();
+        let taken = (-1..=1).any(|dz| {
+            (-1..=1).any(|dy| {
+                (-1..=1).any(|dx| {
+                    let near = [
+                        key[0].wrapping_add(dx),
+                        key[1].wrapping_add(dy),
+                        key[2].wrapping_add(dz),
+                    ];
+                    grid.get(&near).is_some_and(|points| {
+                        points.iter().any(|(other, r)| {
+                            let distance = other.position.distance(c.position);
+                            distance < SPACING * r.min(radius) && other.faces(c.normal)
+                        })
+                    })
+                })
+            })
+        });
+        if !taken {
+            grid.entry(key).or_default().push((*c, radius));
+            kept.push(*c);
+        }
+    }
+    kept
+}

@@ -1,0 +1,156 @@
+//! Records of indirect irradiance on surfaces.
+//!
+//! They serve Lambertian surfaces; what shines is traced. Radii follow the harmonic mean distance to other surfaces (Ward et al. 1988).
+
+use super::{Candidate, Counted, Kind, MORE_RAYS, SAME_SURFACE, quiet_enough};
+use glam::Vec3;
+use std::cell::Cell;
+use tyndall_cache::{Cache, Record};
+use tyndall_math::{Key, Purpose, Ray};
+use tyndall_scene::Scene;
+use tyndall_transport::irradiance::irradiance;
+use tyndall_transport::path::Reach;
+use tyndall_transport::walls::Walls;
+use tyndall_transport::world::{Geometry, SurfaceHit};
+
+/// Directions of a record at an error of 1: their number goes with the inverse square of the error.
+const RAYS_GAIN: f32 = 0.5;
+/// Radii at an error of 1, in harmonic mean distances.
+const RADIUS_GAIN: f32 = 2.0;
+/// Smallest and largest radius in pixels.
+const FOOTPRINTS: [f32; 2] = [1.5, 24.0];
+/// A record is not valid farther than this share of its radius above or below its plane.
+const THICKNESS: f32 = 0.2;
+/// Keeps the random numbers of records on surfaces from those of records in media.
+const SURFACE: u64 = 1 << 40;
+
+/// Where a record on a surface is valid.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::integrator) struct Side {
+    normal: Vec3,
+    walls: Walls,
+    /// Other surfaces are so close that light changes from pixel to pixel: here, nothing is interpolated.
+    crowded: bool,
+}
+
+/// A cache of indirect irradiance over π.
+pub(in crate::integrator) type SurfaceCache = Cache<3, Side>;
+
+/// Irradiance over π by indirect light at `p` on a surface with the unit `normal` towards the viewer, where records are valid.
+pub(in crate::integrator) fn lookup(cache: &SurfaceCache, p: Vec3, normal: Vec3) -> Option<Vec3> {
+    let crowded = Cell::new(false);
+    let found = cache.lookup_where(p, |side, offset| {
+        let holds = side.holds(p, normal, offset);
+        crowded.set(crowded.get() || holds && side.crowded);
+        holds
+    });
+    found.filter(|_| !crowded.get()).map(Vec3::from)
+}
+
+impl Side {
+    fn holds(&self, p: Vec3, normal: Vec3, offset: Vec3) -> bool {
+        self.normal.dot(normal) >= SAME_SURFACE
+            && self.normal.dot(offset).abs() < THICKNESS
+            && self.walls.hold(p)
+    }
+}
+
+/// Indirect light on the surfaces that the camera sees.
+pub(in crate::integrator) struct Surfaces<'s> {
+    pub(in crate::integrator) scene: &'s Scene,
+    pub(in crate::integrator) frame: [u32; 2],
+    pub(in crate::integrator) reach: Reach<'s>,
+    pub(in crate::integrator) seed: u64,
+    /// Target error of the image.
+    pub(in crate::integrator) error: f32,
+}
+
+impl Surfaces<'_> {
+    fn n_rays(&self) -> usize {
+        ((RAYS_GAIN / self.error).powi(2) as usize).clamp(128, 4096)
+    }
+
+    fn hit<G: Geometry>(geometry: &G, ray: &Ray) -> Option<SurfaceHit> {
+        geometry
+            .intersect(ray, f32::INFINITY)
+            .filter(|hit| hit.bsdf.is_lambert())
+    }
+}
+
+impl Kind for Surfaces<'_> {
+    type Tag = Side;
+
+    fn most_radius(&self) -> f32 {
+        // Far pixels see far surfaces; thinning looks no farther than this.
+        let [w, h] = self.frame;
+        let mut most = f32::MIN_POSITIVE;
+        for j in 0..8 {
+            for i in 0..8 {
+                let (x, y) = ((i as f32 + 0.5) / 8.0, (j as f32 + 0.5) / 8.0);
+                let ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
+                if let Some(hit) = self.scene.geometry.intersect(&ray, f32::INFINITY) {
+                    most = most.max(FOOTPRINTS[1] * self.scene.camera.footprint(hit.t, h));
+                }
+            }
+        }
+        most
+    }
+
+    fn points_on(&self, ray: &Ray, pixel: [u32; 2], _: f32, mut visit: impl FnMut(Candidate)) {
+        if let Some(hit) = Self::hit(&self.scene.geometry, ray) {
+            visit(Candidate {
+                position: hit.position,
+                normal: hit.bsdf.normal(),
+                footprint: self.scene.camera.footprint(hit.t, self.frame[1]),
+                ray: *ray,
+                pixel,
+            });
+        }
+    }
+
+    fn covers(&self, cache: &SurfaceCache, candidate: &Candidate) -> bool {
+        let p = candidate.position;
+        cache.covers_where(p, |side, offset| side.holds(p, candidate.normal, offset))
+    }
+
+    fn record(
+        &self,
+        geometry: &Counted<'_>,
+        candidate: &Candidate,
+        index: u64,
+        _round: usize,
+    ) -> Option<(Record<3>, Side)> {
+        let world = geometry.world(self.scene);
+        let hit = Self::hit(geometry, &candidate.ray)?;
+        let key = Key {
+            seed: self.seed,
+            purpose: Purpose::Record,
+            index: SURFACE | index,
+        };
+        let g = quiet_enough(self.error, |attempt| {
+            let n_rays = self.n_rays() * MORE_RAYS.pow(attempt as u32);
+            irradiance(&world, &hit, n_rays, self.reach, key)
+        });
+        let [least, most] = FOOTPRINTS.map(|n| n * candidate.footprint);
+        let radius = (RADIUS_GAIN * self.error.sqrt()).clamp(0.05, 1.0) * g.harmonic_mean_distance;
+        let radius = radius.min(most).min(g.walls.beyond);
+        let crowded = radius < least;
+        let radius = radius.max(least);
+        let variance = g.value_error * g.value_error;
+        let finite =
+            g.value.is_finite() && variance.is_finite() && g.gradient.iter().all(|d| d.is_finite());
+        let record = Record {
+            position: hit.position,
+            radius: radius.max(f32::MIN_POSITIVE),
+            value: g.value.max(Vec3::ZERO).to_array(),
+            gradient: g.gradient,
+            variance: variance.to_array(),
+        };
+        let side = Side {
+            normal: hit.bsdf.normal(),
+            walls: g.walls,
+            crowded,
+        };
+        finite.then_some((record, side))
+    }
+}

@@ -1,0 +1,92 @@
+//! Ends a path on its present stretch: one place in the medium and the surface behind it tell all light that comes along the ray.
+//!
+//! What lies near is known too coarsely where light changes most: there, light straight from lights is sampled.
+
+use super::{Field, Part};
+use crate::direct;
+use crate::free_flight::FreeFlight;
+use crate::path::{Source, Vertex, Visitor, source};
+use crate::single::SegmentLight;
+use crate::world::{Geometry, Lights, SurfaceHit, World};
+use glam::Vec3;
+use tyndall_math::{Ray, Sampler};
+
+impl Field {
+    /// Tells `visitor` the light that scatters in media along `ray` and on the surface it ends on; false, and nothing told, where the
+    /// field knows too little of either.
+    ///
+    /// Light straight from emitters and light that media emit is left to the caller.
+    pub(crate) fn end<'m, G: Geometry, L: Lights>(
+        &self,
+        world: &World<'m, G, L>,
+        (ray, hit): (&Ray, Option<&SurfaceHit>),
+        flight: &FreeFlight<'m>,
+        throughput: Vec3,
+        sampler: &mut Sampler,
+        visitor: &mut impl Visitor,
+    ) -> bool {
+        let [u, choice] = sampler.next_2d();
+        let reflected = match hit {
+            None => None,
+            Some(hit) => match self.surface(world.geometry, ray, hit) {
+                None => return false,
+                Some(known) => Some((hit, known)),
+            },
+        };
+        let near = self.near(ray.origin);
+        let mut tell = |value: Vec3, vertex: Vertex<'_, '_>, source: Source| {
+            if value.is_finite() && value.max_element() > 0.0 {
+                visitor.light(throughput * value, Some(vertex), source);
+            }
+        };
+        if flight.can_stop()
+            && let Some(t) = flight.sample_inside(u)
+        {
+            let x = ray.at(t);
+            let part = if t < near { Part::Indirect } else { Part::All };
+            let Some(light) = self.medium(world.geometry, x, part) else {
+                return false;
+            };
+            let medium = world.media.at(x);
+            let stop = flight.stop(t);
+            let value =
+                stop.transmittance * medium.sigma_s * light.value / flight.pdf_inside(&stop);
+            let log_gradient =
+                std::array::from_fn(|c| light.gradient[c] / light.value[c].max(f32::MIN_POSITIVE));
+            tell(
+                value,
+                Vertex::Medium(x, &medium),
+                Source::Scattered(log_gradient),
+            );
+            let flight = FreeFlight::new(
+                world
+                    .media
+                    .segment(ray, near.min(flight.segment().range().1)),
+                Vec3::ONE,
+            );
+            if let Some(lights) = SegmentLight::new(world, ray, &flight) {
+                let (v, w) = (sampler.next_1d(), sampler.next_2d());
+                if let Some(s) = lights.sample(world, choice, v, w) {
+                    let x = ray.at(s.stop.t);
+                    tell(s.value, Vertex::Medium(x, &s.medium), source(x, &s.light));
+                }
+            }
+        }
+        if let Some((hit, (radiance, part))) = reflected {
+            let vertex = Vertex::Surface(hit.position, hit.normal);
+            let arrives = flight.transmittance();
+            tell(
+                arrives * radiance,
+                vertex,
+                Source::Scattered([Vec3::ZERO; 3]),
+            );
+            if part == Part::Indirect
+                && let Some(s) = direct::on_surface(world, hit, choice, sampler.next_2d())
+            {
+                let value = arrives * hit.bsdf.eval(-ray.direction, s.w_i) * s.radiance;
+                tell(value, vertex, source(hit.position, &s.light));
+            }
+        }
+        true
+    }
+}
