@@ -192,12 +192,15 @@ impl Film {
     /// `None` until every pixel has two samples. The variances are means over 3 × 3 pixels: two halves tell little of one.
     pub fn goals(&self, target: f64, growth: u32) -> Option<Vec<u32>> {
         let (width, height) = (self.crop.width as usize, self.crop.height as usize);
-        let squared = mean_3x3(&self.squared_errors()?, width, height);
+        let raw = self.squared_errors()?;
+        let squared = mean_3x3(&raw, width, height);
         let taken = || self.counts.iter().map(|[n, m]| n + m);
         let root: Vec<f64> = (squared.iter().zip(taken()))
             .map(|(v, n)| (v * f64::from(n)).sqrt())
             .collect();
-        let scale = mean_of(&root) / (target * target);
+        // At the border smoothing may lose some of the error.
+        let lost = (mean_of(&raw) / mean_of(&squared)).max(1.0);
+        let scale = lost * mean_of(&root) / (target * target);
         let goal = |(root, n): (&f64, u32)| {
             let most = n.saturating_mul(growth);
             let wanted = (root * scale).ceil().min(f64::from(most)) as u32;

@@ -1,6 +1,6 @@
 //! From a scene to an image: volumetric radiance caching and path tracing, the film, its layers, and image files.
 //!
-//! [`render`](render()) does it all: it starts the threads, fills the cache of multiple scattering where one is used, takes
+//! [`render`](render()) does it all: it starts the threads, fills the caches of multiple scattering and of indirect light on surfaces, takes
 //! camera samples until the image is as good as was asked, and gives back the image with what it cost. Three types to know:
 //!
 //! * [`RenderOptions`](options::RenderOptions): what is asked; the default leaves each choice to the scene file;

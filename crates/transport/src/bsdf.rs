@@ -9,9 +9,8 @@ use tyndall_math::{Frame, warp};
 /// Smallest GGX width used. Smoother surfaces are drawn this smooth: a lobe of 0.06° that the sampler still resolves in f32.
 const MIN_ALPHA: f32 = 1e-3;
 
-/// Lobes narrower than this width, and brighter than this at normal incidence, make a surface shiny.
+/// Lobes narrower than this width make a surface shiny.
 const SHINY_ALPHA: f32 = 0.3;
-const SHINY_REFLECTANCE: f32 = 0.2;
 
 /// Reflection at one surface point.
 ///
@@ -66,9 +65,17 @@ impl Bsdf {
         self.f90 == 0.0 && self.f0 == Vec3::ZERO
     }
 
-    /// Whether what it reflects depends much on direction: a narrow lobe with a good share of the light.
+    /// Whether what it reflects depends much on direction.
     pub(crate) fn is_shiny(&self) -> bool {
-        self.alpha < SHINY_ALPHA && self.f0.max_element() > SHINY_REFLECTANCE
+        self.alpha < SHINY_ALPHA && !self.is_lambert()
+    }
+
+    /// The same surface, rough enough not to be shiny.
+    pub(crate) fn roughened(self) -> Self {
+        Self {
+            alpha: self.alpha.max(SHINY_ALPHA),
+            ..self
+        }
     }
 
     /// About the share of even light that leaves along `w_o`, per colour channel; exact for Lambertian surfaces. What GGX loses to

@@ -1,7 +1,7 @@
 //! What a cache record is made of: multiple-scattered radiance at a point, its gradient and their standard errors.
 //!
-//! Stratified directions over the sphere start unbiased paths; light straight from emitters is left out, because single
-//! scattering is computed where it is needed.
+//! Stratified directions over the sphere start paths, which go to their end or into a coarse field of light. Light straight from
+//! emitters is left out, because single scattering is computed where it is needed.
 
 use crate::lamp_directions::LampDirections;
 use crate::occlusion::{self, Seen};

@@ -2,7 +2,7 @@
 //! multiple scattering is made of, with its gradient.
 //!
 //! The crate sees a scene through two small traits, so that anything which can be hit and anything that shines will do; a
-//! medium is one of `tyndall-media`. Six things to know:
+//! medium is one of `tyndall-media`. Eight things to know:
 //!
 //! * [`World`]: surfaces ([`Geometry`]), lights ([`Lights`]) and media, borrowed, together;
 //! * [`path::trace`]: one path through a world; a [`path::Visitor`] hears of every vertex and of all light it finds.
@@ -10,7 +10,9 @@
 //! * [`single::SegmentLight`]: light scattered once on a ray, straight from the lights, also right beside a lamp;
 //! * [`shafts::Shafts`]: the same from one light without extent, by the stretches of the ray that it shines on;
 //! * [`inscatter::single`]: light scattered once at one point, with gradient and Hessian;
-//! * [`gather::multiple`]: light scattered before that arrives at a point, its gradient, and the standard errors of both.
+//! * [`gather::multiple`]: light scattered before that arrives at a point, its gradient, and the standard errors of both;
+//! * [`irradiance::irradiance`]: the same on a surface;
+//! * [`field::Field`]: a coarse field of light in which the paths of both may end, so that their cost is that of one scattering.
 //!
 //! # Example
 //!

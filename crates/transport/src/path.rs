@@ -169,6 +169,8 @@ pub fn trace<'m, G: Geometry, L: Lights>(
     let mut rival = Rival::None;
     let mut first = start.first;
     let mut events = 0;
+    // Whether the last scattering blurs what lies beyond it, so that cells of light do not show; and whether a field was too coarse once.
+    let (mut blurred, mut refused) = (true, false);
     let may_scatter = |events: u32| start.reach.max_depth.is_none_or(|max| events < max);
 
     loop {
@@ -188,18 +190,21 @@ pub fn trace<'m, G: Geometry, L: Lights>(
             }
         }
 
-        if let (Some(field), FirstEvent::Any, None) =
-            (start.reach.field, first, start.reach.max_depth)
-        {
+        if let (Some(field), FirstEvent::Any, None) = (
+            start.reach.field.filter(|_| blurred),
+            first,
+            start.reach.max_depth,
+        ) {
             // Light that media emit is sampled; all that scatters on the stretch or at its end is read.
             let end = (&ray, hit.as_ref());
-            if field.end(world, end, &flight, throughput, sampler, visitor) {
+            if field.end(world, end, &flight, (throughput, refused), sampler, visitor) {
                 if let Some(e) = emission::sample(world, &ray, &flight, sampler.next_1d()) {
                     let vertex = Vertex::Medium(ray.at(e.t), &e.medium);
                     visitor.light(throughput * e.value, Some(vertex), Source::Medium);
                 }
                 return;
             }
+            refused = true;
         }
         let lights = if first == FirstEvent::Any && !flight.segment().is_empty() {
             let [u, v] = sampler.next_2d();
@@ -253,6 +258,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
                     density: lights.density_at(&stop),
                     pdf,
                 });
+                blurred = true;
                 ray = Ray::new(x, w_i);
             }
             (None, Some(hit)) => {
@@ -285,6 +291,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
                 let pdf = reflection_pdf(hit, &lamps, w_o, w_i);
                 throughput *= hit.bsdf.eval(w_o, w_i) / pdf;
                 rival = Rival::Surface { choice, pdf };
+                blurred = !hit.bsdf.is_shiny();
                 ray = hit.spawn(w_i);
             }
             (None, None) => return,

@@ -1,7 +1,7 @@
 //! One camera sample: the layers of a pixel along one ray, by path tracing or from cache records.
 //!
-//! The cached way computes single scattering straight from the lights, reads multiple scattering from records and traces
-//! surfaces; each scene pays only for what it holds.
+//! The cached way computes single scattering straight from the lights, reads multiple scattering and indirect light on
+//! surfaces from records; each scene pays only for what it holds.
 
 use super::counted::Counted;
 use super::fill::media::{self, MediaCache};

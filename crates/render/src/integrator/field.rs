@@ -13,6 +13,8 @@ use tyndall_transport::field::{CellWidths, Field, Filling, Found};
 
 /// Width of cells over their distance from the eye, at most; at least half of it.
 const WIDTH: f32 = 1.0 / 24.0;
+/// Least width of cells over the eye's coordinates.
+const LEAST_WIDTH: f32 = 1e-5;
 /// Light found at an error of 1: how much is asked for goes with the inverse square of the error.
 const FOUND_GAIN: f32 = 600.0;
 /// Least and most light found, counted by scatterings.
@@ -20,7 +22,7 @@ const FOUND: [f32; 2] = [200_000.0, 10_000_000.0];
 /// Walks that may find too little before the filling ends, per scattering asked for: most rays may leave the scene at once.
 const WALKS_PER_FOUND: u64 = 2;
 /// Walks of one batch.
-const BATCH: u64 = 16_384;
+const BATCH: u64 = 4096;
 /// Walks that a thread follows in one piece.
 const PIECE: u64 = 256;
 
@@ -43,11 +45,10 @@ pub(super) fn fill(
 ) -> FilledField {
     let counted = Counted::new(scene);
     let wanted = (FOUND_GAIN / (error * error)).clamp(FOUND[0], FOUND[1]) as u64;
-    let mut filling = Filling::new(CellWidths::around(
-        scene.camera.eye(),
-        WIDTH,
-        f32::MIN_POSITIVE,
-    ));
+    let eye = scene.camera.eye();
+    // No smaller than coordinates are fine.
+    let least = (LEAST_WIDTH * eye.abs().max_element()).max(f32::MIN_POSITIVE);
+    let mut filling = Filling::new(CellWidths::around(eye, WIDTH, least));
     let (mut first, mut held) = (0, 0);
     let mut cut_short = false;
     while held < wanted && first < WALKS_PER_FOUND * wanted && !cut_short {

@@ -39,7 +39,8 @@ const MOST_SAMPLES: u32 = 1 << 20;
 /// (added in squares, 0.8² + 0.6² = 1).
 const NOISE_SHARE: f64 = 0.8;
 
-/// Shares of a time limit after which the fill and the samples end; the rest goes to the estimate of the error.
+/// Shares of a time limit after which the filling of the field, that of the caches and the samples end; the rest goes to the estimate
+/// of the error.
 const FIELD_DEADLINE: f64 = 0.2;
 const FILL_DEADLINE: f64 = 0.4;
 const RENDER_DEADLINE: f64 = 0.8;
@@ -225,7 +226,7 @@ impl<'s> Run<'s> {
         }
         if cut_short {
             notes.push(
-                "the time limit ended the filling of the cache: where records are missing paths are traced, with more noise"
+                "the time limit ended the filling of the cache: where light is not known paths are traced, with more noise"
                     .to_owned(),
             );
         }
@@ -241,21 +242,23 @@ impl<'s> Run<'s> {
                 stats.spp
             ));
         }
+        let surface = grouped(stats.records.get("surface").copied().unwrap_or(0));
         let found = match way {
             Way::PathIntegrator => "integrator: path".to_owned(),
-            Way::NoMultiple => "records: none; single: direct; SH: off".to_owned(),
+            Way::NoMultiple => format!("records: {surface} surface; single: direct; SH: off"),
             Way::Records => format!(
-                "records: {} multiple, {} surface; single: direct; SH: off",
-                grouped(stats.records["multiple"]),
-                grouped(stats.records.get("surface").copied().unwrap_or(0))
+                "records: {} multiple, {surface} surface; single: direct; SH: off",
+                grouped(stats.records["multiple"])
             ),
             Way::Paths => {
                 "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
             }
         };
         let mut image = film.image();
-        if let (Some(filled), Some(points)) = (&filled, image.channels.get_mut("records")) {
-            mark_records(&filled.pixels, self.crop, points);
+        if let Some(points) = image.channels.get_mut("records") {
+            let media = filled.iter().flat_map(|filled| &filled.pixels);
+            let surfaces = indirect.iter().flat_map(|filled| &filled.pixels);
+            mark_records(media.chain(surfaces), self.crop, points);
         }
         Ok(Outcome {
             image,
@@ -266,14 +269,17 @@ impl<'s> Run<'s> {
         })
     }
 
+    fn is_lit(&self) -> bool {
+        self.scene.lights.count() > 0 || self.scene.media.emits()
+    }
+
     /// The cheapest way that does what this scene needs.
     fn way(&self, notes: &mut Vec<String>) -> Way {
         let media = &self.scene.media;
-        let lit = self.scene.lights.count() > 0 || media.emits();
         let scatters = media.list().iter().any(|m| m.sigma_s() != Vec3::ZERO);
         if self.options.integrator == Integrator::Path {
             Way::PathIntegrator
-        } else if !lit
+        } else if !self.is_lit()
             || !scatters
             || self
                 .max_depth
@@ -295,6 +301,7 @@ impl<'s> Run<'s> {
     /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
     fn has_field(&self, way: Way) -> bool {
         way != Way::PathIntegrator
+            && self.is_lit()
             && self.max_depth.is_none()
             && self.scene.media.is_isotropic()
             && (way == Way::Records || !self.scene.geometry.is_empty())
@@ -351,14 +358,23 @@ impl<'s> Run<'s> {
             if self.options.spp.is_some() || mean_samples >= f64::from(MOST_SAMPLES) {
                 return (tally, false);
             }
-            match film.relative_error() {
-                Some(error) if error > target => {}
+            let error = match film.relative_error() {
+                Some(error) if error > target => error,
+                _ => return (tally, false),
+            };
+            let next = match self.options.integrator {
+                // Samples that decide where more are taken would bias the ground truth.
+                Integrator::Path => {
+                    let factor = (error / target).powi(2).clamp(1.1, f64::from(GROWTH));
+                    let goal = (mean_samples * factor).ceil() as u32 + 1;
+                    Some(vec![goal.min(MOST_SAMPLES) & !1; pixels])
+                }
+                Integrator::Cache => film.goals(target, GROWTH),
+            };
+            match next {
+                Some(next) if next != goals => goals = next,
                 _ => return (tally, false),
             }
-            let Some(next) = film.goals(target, GROWTH) else {
-                return (tally, false);
-            };
-            goals = next;
         }
     }
 
@@ -417,7 +433,7 @@ impl<'s> Run<'s> {
         for (x, &goal) in row.columns().zip(goals) {
             let pixel = u64::from(row.y) * u64::from(self.frame[0]) + u64::from(x);
             let taken = row.taken(x);
-            let until = goal.min(taken + pass_length(taken));
+            let until = goal.min(taken + pass_length(taken, goal));
             short_of_goals |= until < goal;
             samples += u64::from(until - taken);
             for sample in taken..until {
@@ -480,7 +496,7 @@ fn grouped(n: u64) -> String {
 }
 
 /// Counts the records asked for through each pixel of `crop`.
-fn mark_records(pixels: &[[u32; 2]], crop: Crop, counts: &mut [f32]) {
+fn mark_records<'p>(pixels: impl Iterator<Item = &'p [u32; 2]>, crop: Crop, counts: &mut [f32]) {
     for &[x, y] in pixels {
         let inside =
             x >= crop.x && y >= crop.y && x - crop.x < crop.width && y - crop.y < crop.height;
@@ -490,9 +506,9 @@ fn mark_records(pixels: &[[u32; 2]], crop: Crop, counts: &mut [f32]) {
     }
 }
 
-/// Samples a pass may take when `taken` have been taken.
-fn pass_length(taken: u32) -> u32 {
-    taken.clamp(2, 16)
+/// Samples that a pass may take of a pixel that has `taken` of the `goal`.
+fn pass_length(taken: u32, goal: u32) -> u32 {
+    taken.clamp(2, 16).max(goal.saturating_sub(taken) / 4)
 }
 
 /// The gate of the film: a sample that is not finite is a bug; it is counted, reported and must not spoil the pixel.

@@ -10,7 +10,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 /// Cells of neighbouring sizes in which a point's light counts: the smallest, and larger ones where little has been seen.
 pub(super) const SIZES: i32 = 5;
 /// Sides of one cell that are told apart; light on further ones is not counted.
-const MOST_SIDES: usize = 4;
+pub(super) const MOST_SIDES: usize = 4;
 /// By how many sizes cells in media are larger than those on surfaces: light changes slowly there.
 const MEDIUM_LARGER: i32 = 1;
 
@@ -221,18 +221,13 @@ impl Cells {
         std::iter::successors(Some(first), |&side| self.sides[side as usize].next)
     }
 
-    /// One more side for the cell whose first is `first`; `None` where it has enough.
-    pub(super) fn add_side(&mut self, first: u32, anchor: Vec3, normal: Vec3) -> Option<u32> {
-        let (n, last) = self
-            .sides_from(first)
-            .fold((0, first), |(n, _), side| (n + 1, side));
-        if n >= MOST_SIDES {
-            return None;
-        }
+    /// One more side for the cell whose first is `first`.
+    pub(super) fn add_side(&mut self, first: u32, anchor: Vec3, normal: Vec3) -> u32 {
+        let last = self.sides_from(first).last().unwrap_or(first);
         let added = self.sides.len() as u32;
         self.push(self.sides[first as usize].place, anchor, normal);
         self.sides[last as usize].next = Some(added);
-        Some(added)
+        added
     }
 }
 

@@ -2,18 +2,42 @@
 //!
 //! What lies near is known too coarsely where light changes most: there, light straight from lights is sampled.
 
-use super::{Field, Part};
-use crate::direct;
+use super::{Field, FieldLight, Part};
 use crate::free_flight::FreeFlight;
-use crate::path::{Source, Vertex, Visitor, source};
+use crate::path::{Reach, Source, Vertex, Visitor, source};
 use crate::single::SegmentLight;
 use crate::world::{Geometry, Lights, SurfaceHit, World};
+use crate::{direct, gather};
 use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
 use tyndall_math::{Ray, Sampler};
+
+/// The part of a path's numbers that stands in for what no cell knows.
+const UNKNOWN: u64 = 0xf1e1d;
+
+/// Light in the medium at `x` by one path, where no cell knows it.
+fn traced<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    part: Part,
+    sampler: &mut Sampler,
+) -> FieldLight {
+    let mut sampler = sampler.branch(UNKNOWN);
+    let direct = match part {
+        Part::Indirect => None,
+        Part::All => direct::in_medium(world, x, sampler.next_1d(), sampler.next_2d()),
+    };
+    // Fields are for media that scatter alike in all directions.
+    let direct = direct.map_or(Vec3::ZERO, |s| s.radiance * (0.25 * FRAC_1_PI));
+    FieldLight {
+        value: direct + gather::one(world, x, Reach::default(), &mut sampler),
+        gradient: [Vec3::ZERO; 3],
+    }
+}
 
 impl Field {
     /// Tells `visitor` the light that scatters in media along `ray` and on the surface it ends on; false, and nothing told, where the
-    /// field knows too little of either.
+    /// field knows too little of that surface, or where that is too `close` for cells to be read.
     ///
     /// Light straight from emitters and light that media emit is left to the caller.
     pub(crate) fn end<'m, G: Geometry, L: Lights>(
@@ -21,14 +45,14 @@ impl Field {
         world: &World<'m, G, L>,
         (ray, hit): (&Ray, Option<&SurfaceHit>),
         flight: &FreeFlight<'m>,
-        throughput: Vec3,
+        (throughput, close): (Vec3, bool),
         sampler: &mut Sampler,
         visitor: &mut impl Visitor,
     ) -> bool {
         let [u, choice] = sampler.next_2d();
         let reflected = match hit {
             None => None,
-            Some(hit) => match self.surface(world.geometry, ray, hit) {
+            Some(hit) => match self.surface(world.geometry, ray, hit, close) {
                 None => return false,
                 Some(known) => Some((hit, known)),
             },
@@ -44,10 +68,10 @@ impl Field {
         {
             let x = ray.at(t);
             let part = if t < near { Part::Indirect } else { Part::All };
-            let Some(light) = self.medium(world.geometry, x, part) else {
-                return false;
-            };
             let medium = world.media.at(x);
+            let light = self
+                .medium(world.geometry, x, part)
+                .unwrap_or_else(|| traced(world, x, part, sampler));
             let stop = flight.stop(t);
             let value =
                 stop.transmittance * medium.sigma_s * light.value / flight.pdf_inside(&stop);

@@ -8,7 +8,7 @@ mod end;
 mod walk;
 
 use crate::world::{Geometry, Lights, SurfaceHit, World};
-use cells::{Cells, Kind, Light, NO_LINK, Place, SIZES, Side, width};
+use cells::{Cells, Kind, Light, MOST_SIDES, NO_LINK, Place, SIZES, Side, width};
 use glam::{IVec3, Vec3};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -149,8 +149,9 @@ impl Cells {
         cell: u32,
         (p, normal): (Vec3, Vec3),
     ) -> Option<u32> {
+        let is_full = self.sides_from(cell).count() >= MOST_SIDES;
         let seen = self.seen(geometry, cell, p);
-        seen.or_else(|| self.add_side(cell, p, normal))
+        seen.or_else(|| (!is_full).then(|| self.add_side(cell, p, normal)))
     }
 }
 
@@ -311,10 +312,11 @@ impl Field {
             normal,
         } = *asked;
         let smallest = self.widths.exponent(position, kind);
+        // As far off the surface as light was found from: farther, it could lie behind what is opposite.
+        let eye = asked.eye(width(smallest));
         (smallest..smallest + SIZES).find_map(|exponent| {
             let cell = self.cells.find(Place::of(position, exponent, kind))?;
             let width = width(exponent);
-            let eye = asked.eye(width);
             let anchor = self.cells.sides[cell as usize].anchor;
             // In a clear cell everything sees everything, on a surface as far as it is flat.
             let is_clear = self.surroundings[cell as usize].is_clear
@@ -379,12 +381,13 @@ impl Field {
     }
 
     /// Radiance that the surface at `hit`, met by `ray`, reflects, and whether that is all or only of indirect light, as where it is near;
-    /// `None` where too little is known of it, where it is closer still, or so shiny that irradiance says little.
+    /// `None` where too little is known of it, where it is closer still and may not be `close`, or so shiny that irradiance says little.
     pub(crate) fn surface<G: Geometry>(
         &self,
         geometry: &G,
         ray: &Ray,
         hit: &SurfaceHit,
+        close: bool,
     ) -> Option<(Vec3, Part)> {
         if hit.bsdf.is_shiny() {
             return None;
@@ -396,7 +399,7 @@ impl Field {
         };
         let side = self.side_at(geometry, &asked)? as usize;
         let width = width(self.cells.sides[side].place.exponent);
-        if hit.t < CLOSE * width {
+        if !close && hit.t < CLOSE * width {
             return None;
         }
         let part = if hit.t < NEAR * width {

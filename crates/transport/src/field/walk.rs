@@ -20,6 +20,8 @@ const LONG: usize = 64;
 const LONG_SURVIVAL: f32 = 0.95;
 /// Least chance to go on: bounds the weight of those that do.
 const SURVIVAL_MIN: f32 = 0.1;
+/// Free flights follow each channel at least this much as the brightest.
+const LEAST_CHANNEL: f32 = 0.1;
 /// Sets of four sample dimensions for each stretch.
 const SETS_PER_STRETCH: u32 = 2;
 
@@ -60,7 +62,9 @@ pub(super) fn walk<G: Geometry, L: Lights>(
         let [free, emission, choice, roulette] = four(sampler);
         let hit = world.geometry.intersect(&ray, f32::INFINITY);
         let t_max = hit.map_or(f32::INFINITY, |h| h.t);
-        let flight = FreeFlight::new(world.media.segment(&ray, t_max), throughput);
+        // No channel is left out: vertices to come count all of them.
+        let steer = throughput.max(Vec3::splat(LEAST_CHANNEL * throughput.max_element()));
+        let flight = FreeFlight::new(world.media.segment(&ray, t_max), steer);
         let emitted =
             emission::sample(world, &ray, &flight, emission).map_or(Vec3::ZERO, |e| e.value);
         let w_o = -ray.direction;
@@ -174,20 +178,22 @@ fn on_surface<G: Geometry, L: Lights>(
     light: [f32; 2],
     [u, v]: [f32; 2],
 ) -> (Vertex, Onward) {
-    let normal = hit.bsdf.normal();
+    // Rough, so that no chance reflection of a light outshines a cell.
+    let bsdf = hit.bsdf.roughened();
+    let normal = bsdf.normal();
     let cosine = |w: Vec3| FRAC_1_PI * normal.dot(w).max(0.0);
     let (lit, leaving) =
         direct::on_surface(world, hit, choice, light).map_or((Vec3::ZERO, Vec3::ZERO), |s| {
             (
                 s.radiance * cosine(s.w_i),
-                s.radiance * hit.bsdf.eval(w_o, s.w_i),
+                s.radiance * bsdf.eval(w_o, s.w_i),
             )
         });
     // Gloss asks for directions of its own; half of them keep to the cosine, which bounds the weight of irradiance.
-    let gloss = if hit.bsdf.is_lambert() { 0.0 } else { 0.5 };
+    let gloss = if bsdf.is_lambert() { 0.0 } else { 0.5 };
     let w_i = if u < gloss {
         // The number that chose the light may choose the lobe: the two ways of light only add up.
-        hit.bsdf.sample(w_o, choice, [u / gloss, v]).map(|s| s.w_i)
+        bsdf.sample(w_o, choice, [u / gloss, v]).map(|s| s.w_i)
     } else {
         let u = ((u - gloss) / (1.0 - gloss)).min(1.0 - f32::EPSILON);
         let local = warp::cosine_hemisphere([u, v]);
@@ -197,12 +203,9 @@ fn on_surface<G: Geometry, L: Lights>(
     let carried = onward.map_or([Vec3::ZERO; 2], |w_i| {
         let mut pdf = (1.0 - gloss) * cosine(w_i);
         if gloss > 0.0 {
-            pdf += gloss * hit.bsdf.pdf(w_o, w_i);
+            pdf += gloss * bsdf.pdf(w_o, w_i);
         }
-        [
-            Vec3::splat(cosine(w_i) / pdf),
-            hit.bsdf.eval(w_o, w_i) / pdf,
-        ]
+        [Vec3::splat(cosine(w_i) / pdf), bsdf.eval(w_o, w_i) / pdf]
     });
     let vertex = Vertex {
         found: Found {

@@ -84,7 +84,11 @@ pub(in crate::integrator) fn nearest(cache: &MediaCache, p: Vec3, reach: f32) ->
     let mut nearest: Option<(f32, usize)> = None;
     cache.for_each_near(p, reach, |index, record| {
         let distance = record.position.distance_squared(p);
-        if cache.tags()[index].hold(p) && nearest.is_none_or(|n| (distance, index) < n) {
+        let walls = &cache.tags()[index];
+        if walls.hold(p)
+            && distance < walls.beyond * walls.beyond
+            && nearest.is_none_or(|n| (distance, index) < n)
+        {
             nearest = Some((distance, index));
         }
     });
@@ -94,7 +98,7 @@ pub(in crate::integrator) fn nearest(cache: &MediaCache, p: Vec3, reach: f32) ->
 impl Kind for Media<'_> {
     type Tag = Walls;
 
-    fn most_radius(&self) -> f32 {
+    fn most_radius(&self, _: &Candidate) -> f32 {
         RADIUS_RANGE[1] * self.view
     }
 

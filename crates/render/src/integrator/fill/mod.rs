@@ -56,8 +56,8 @@ pub(super) trait Kind: Sync {
     /// Where a record is valid within its ball.
     type Tag: Clone + Send + Sync;
 
-    /// Largest radius of a record.
-    fn most_radius(&self) -> f32;
+    /// Largest radius of a record at a point.
+    fn most_radius(&self, candidate: &Candidate) -> f32;
 
     /// The points on a camera ray that ask for records.
     fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, visit: impl FnMut(Candidate));
@@ -92,6 +92,8 @@ pub(super) struct Filled<T> {
     /// The pixel through which each record was asked for: column and row.
     pub(super) pixels: Vec<[u32; 2]>,
     pub(super) rays: u64,
+    /// Points at which records were computed, kept or not: each has random numbers of its own.
+    asked: usize,
     /// Whether the deadline ended the fill.
     pub(super) cut_short: bool,
 }
@@ -126,6 +128,7 @@ impl<K: Kind> Fill<'_, K> {
             cache: Cache::tagged(),
             pixels: Vec::new(),
             rays: 0,
+            asked: 0,
             cut_short: false,
         };
         let strides = strides(self.frame);
@@ -141,7 +144,9 @@ impl<K: Kind> Fill<'_, K> {
                 if missing.is_empty() || (round == 0 && share < GAPS_LEFT) {
                     break;
                 }
-                let points = thin(&missing, &filled.cache, self.kind.most_radius());
+                let points = thin(&missing, &filled.cache, |point| {
+                    self.kind.most_radius(point)
+                });
                 if !self.compute(&mut filled, &points, round, progress, fraction) {
                     break;
                 }
@@ -159,7 +164,8 @@ impl<K: Kind> Fill<'_, K> {
         progress: &dyn Progress,
         fraction: f32,
     ) -> bool {
-        let first = filled.cache.len();
+        let (first, held) = (filled.asked, filled.cache.len());
+        filled.asked += points.len();
         let done = AtomicUsize::new(0);
         let computed: Vec<_> = points
             .par_iter()
@@ -173,7 +179,7 @@ impl<K: Kind> Fill<'_, K> {
                     .kind
                     .record(&geometry, point, (first + i) as u64, round);
                 let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-                progress.update(Phase::Fill, fraction, first + n);
+                progress.update(Phase::Fill, fraction, held + n);
                 (record, geometry.rays())
             })
             .collect();
@@ -255,16 +261,17 @@ fn strides(frame: [u32; 2]) -> Vec<u32> {
 fn thin<T: Clone>(
     candidates: &[Candidate],
     cache: &Cache<3, T>,
-    most_radius: f32,
+    most_radius: impl Fn(&Candidate) -> f32,
 ) -> Vec<Candidate> {
+    let cell = (candidates.iter().map(&most_radius)).fold(f32::MIN_POSITIVE, f32::max);
     let mut grid: HashMap<[i32; 3], Vec<(Candidate, f32)>> = HashMap::new();
     let mut kept = Vec::new();
     for c in candidates {
-        let mut radius = most_radius;
+        let mut radius = most_radius(c);
         cache.for_each_near(c.position, radius, |_, r| {
             radius = radius.min(r.radius + RADIUS_SLOPE * r.position.distance(c.position));
         });
-        let key = (c.position / most_radius).floor().as_ivec3().to_array();
+        let key = (c.position / cell).floor().as_ivec3().to_array();
         let taken = (-1..=1).any(|dz| {
             (-1..=1).any(|dy| {
                 (-1..=1).any(|dx| {

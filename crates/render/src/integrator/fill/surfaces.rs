@@ -80,20 +80,8 @@ impl Surfaces<'_> {
 impl Kind for Surfaces<'_> {
     type Tag = Side;
 
-    fn most_radius(&self) -> f32 {
-        // Far pixels see far surfaces; thinning looks no farther than this.
-        let [w, h] = self.frame;
-        let mut most = f32::MIN_POSITIVE;
-        for j in 0..8 {
-            for i in 0..8 {
-                let (x, y) = ((i as f32 + 0.5) / 8.0, (j as f32 + 0.5) / 8.0);
-                let ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
-                if let Some(hit) = self.scene.geometry.intersect(&ray, f32::INFINITY) {
-                    most = most.max(FOOTPRINTS[1] * self.scene.camera.footprint(hit.t, h));
-                }
-            }
-        }
-        most
+    fn most_radius(&self, candidate: &Candidate) -> f32 {
+        FOOTPRINTS[1] * candidate.footprint
     }
 
     fn points_on(&self, ray: &Ray, pixel: [u32; 2], _: f32, mut visit: impl FnMut(Candidate)) {
@@ -132,7 +120,11 @@ impl Kind for Surfaces<'_> {
             irradiance(&world, &hit, n_rays, self.reach, key)
         });
         let [least, most] = FOOTPRINTS.map(|n| n * candidate.footprint);
-        let radius = (RADIUS_GAIN * self.error.sqrt()).clamp(0.05, 1.0) * g.harmonic_mean_distance;
+        // Lengths over which irradiance changes: to other surfaces, and its own relative gradient.
+        let sum: f32 = g.value.element_sum();
+        let slope: f32 = g.gradient.iter().map(|d| d.length()).sum();
+        let inverse = 1.0 / g.harmonic_mean_distance + if sum > 0.0 { slope / sum } else { 0.0 };
+        let radius = (RADIUS_GAIN * self.error.sqrt()).clamp(0.05, 1.0) / inverse;
         let radius = radius.min(most).min(g.walls.beyond);
         let crowded = radius < least;
         let radius = radius.max(least);
