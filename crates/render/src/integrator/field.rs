@@ -7,6 +7,7 @@ use super::counted::Counted;
 use crate::options::{Phase, Progress};
 use rayon::prelude::*;
 use std::time::Instant;
+use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::Scene;
 use tyndall_transport::field::{CellWidths, Field, Filling, Found};
@@ -19,6 +20,10 @@ const LEAST_WIDTH: f32 = 1e-5;
 const FOUND_GAIN: f32 = 600.0;
 /// Least and most light found, counted by scatterings.
 const FOUND: [f32; 2] = [200_000.0, 10_000_000.0];
+const MOST: u64 = FOUND[1] as u64;
+/// Noise of the light at which walks scatter first, over the error asked for: walks go on until it is lower. In thick fog few of them
+/// ever come near a lamp.
+const NOISE: f32 = 0.25;
 /// Walks that may find too little before the filling ends, per scattering asked for: most rays may leave the scene at once.
 const WALKS_PER_FOUND: u64 = 2;
 /// Walks of one batch.
@@ -32,6 +37,8 @@ pub(super) struct FilledField {
     pub(super) rays: u64,
     /// Whether the deadline ended the filling.
     pub(super) cut_short: bool,
+    /// Whether walks found too little of what lights the scene, and no more were allowed.
+    pub(super) unsure: bool,
 }
 
 /// Follows walks from the camera of `scene`, the more the smaller the `error` asked for.
@@ -51,20 +58,36 @@ pub(super) fn fill(
     let mut filling = Filling::new(CellWidths::around(eye, WIDTH, least));
     let (mut first, mut held) = (0, 0);
     let mut cut_short = false;
-    while held < wanted && first < WALKS_PER_FOUND * wanted && !cut_short {
+    // Light where walks scatter first: how well it is known tells whether walks find what lights the scene.
+    let mut light = Welford::new();
+    let unsure = |light: &Welford| light.standard_error() > f64::from(NOISE * error) * light.mean();
+    while (held < wanted || unsure(&light))
+        && held < MOST
+        && first < WALKS_PER_FOUND * wanted
+        && !cut_short
+    {
         let last = first + BATCH;
-        let found: Vec<Found> = (first..last)
+        let pieces: Vec<(Vec<Found>, Vec<f64>)> = (first..last)
             .step_by(PIECE as usize)
             .collect::<Vec<_>>()
             .into_par_iter()
-            .flat_map_iter(|piece| {
-                let mut found = Vec::new();
+            .map(|piece| {
+                let (mut found, mut lights) = (Vec::new(), Vec::new());
                 for walk in piece..(piece + PIECE).min(last) {
+                    let held = found.len();
                     follow(scene, &counted, frame, seed, walk, &mut found);
+                    // The first vertex of a walk is told last.
+                    let light = found[held..].last().map(Found::light);
+                    lights.extend(light.map(|light| f64::from(light.element_sum())));
                 }
-                found
+                (found, lights)
             })
             .collect();
+        let mut found = Vec::new();
+        for (part, lights) in pieces {
+            found.extend(part);
+            lights.into_iter().for_each(|value| light.push(value));
+        }
         let cells = filling.place(&found);
         let sides: Vec<Option<u32>> = found
             .par_iter()
@@ -77,7 +100,7 @@ pub(super) fn fill(
         first = last;
         held += found.len() as u64;
         cut_short = deadline.is_some_and(|d| Instant::now() >= d);
-        progress.update(Phase::Fill, 0.2 * held as f32 / wanted as f32, 0);
+        progress.update(Phase::Fill, (0.2 * held as f32 / wanted as f32).min(0.2), 0);
     }
     let mut field = filling.end(&counted);
     let surroundings = (0..field.len())
@@ -89,6 +112,7 @@ pub(super) fn fill(
         field,
         rays: counted.rays(),
         cut_short,
+        unsure: unsure(&light),
     }
 }
 

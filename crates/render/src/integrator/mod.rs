@@ -242,6 +242,15 @@ impl<'s> Run<'s> {
                 stats.spp
             ));
         }
+        if field
+            .as_ref()
+            .is_some_and(|filled| filled.unsure && !filled.cut_short)
+        {
+            notes.push(
+                "few walks through the fog find the lights: the image may be too dark; `--integrator path` or thinner fog would tell"
+                    .to_owned(),
+            );
+        }
         let surface = grouped(stats.records.get("surface").copied().unwrap_or(0));
         let found = match way {
             Way::PathIntegrator => "integrator: path".to_owned(),
@@ -433,7 +442,7 @@ impl<'s> Run<'s> {
         for (x, &goal) in row.columns().zip(goals) {
             let pixel = u64::from(row.y) * u64::from(self.frame[0]) + u64::from(x);
             let taken = row.taken(x);
-            let until = goal.min(taken + pass_length(taken, goal));
+            let until = goal.min(taken + pass_length(taken));
             short_of_goals |= until < goal;
             samples += u64::from(until - taken);
             for sample in taken..until {
@@ -506,9 +515,9 @@ fn mark_records<'p>(pixels: impl Iterator<Item = &'p [u32; 2]>, crop: Crop, coun
     }
 }
 
-/// Samples that a pass may take of a pixel that has `taken` of the `goal`.
-fn pass_length(taken: u32, goal: u32) -> u32 {
-    taken.clamp(2, 16).max(goal.saturating_sub(taken) / 4)
+/// Samples that a pass may take of a pixel that has `taken`.
+fn pass_length(taken: u32) -> u32 {
+    taken.clamp(2, 16)
 }
 
 /// The gate of the film: a sample that is not finite is a bug; it is counted, reported and must not spoil the pixel.

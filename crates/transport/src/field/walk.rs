@@ -33,6 +33,13 @@ pub struct Found {
     pub(super) light: Light,
 }
 
+impl Found {
+    /// In-scattered radiance in a medium, irradiance over π on a surface, W/(m² sr).
+    pub fn light(&self) -> Vec3 {
+        self.light.all
+    }
+}
+
 /// A vertex of the walk, until the walk is over.
 struct Vertex {
     found: Found,
