@@ -20,7 +20,8 @@ const LEAST_WIDTH: f32 = 1e-5;
 const FOUND_GAIN: f32 = 600.0;
 /// Least and most light found, counted by scatterings.
 const FOUND: [f32; 2] = [200_000.0, 10_000_000.0];
-const MOST: u64 = FOUND[1] as u64;
+/// Most light found over what was asked for, where it is still too noisy.
+const MOST: u64 = 4;
 /// Noise of the light at which walks scatter first, over the error asked for: walks go on until it is lower. In thick fog few of them
 /// ever come near a lamp.
 const NOISE: f32 = 0.25;
@@ -60,9 +61,10 @@ pub(super) fn fill(
     let mut cut_short = false;
     // Light where walks scatter first: how well it is known tells whether walks find what lights the scene.
     let mut light = Welford::new();
-    let unsure = |light: &Welford| light.standard_error() > f64::from(NOISE * error) * light.mean();
+    let noise = |light: &Welford| light.standard_error() / light.mean();
+    let unsure = |light: &Welford| noise(light) > f64::from(NOISE * error);
     while (held < wanted || unsure(&light))
-        && held < MOST
+        && held < MOST * wanted
         && first < WALKS_PER_FOUND * wanted
         && !cut_short
     {
@@ -112,7 +114,7 @@ pub(super) fn fill(
         field,
         rays: counted.rays(),
         cut_short,
-        unsure: unsure(&light),
+        unsure: noise(&light) > f64::from(error),
     }
 }
 
