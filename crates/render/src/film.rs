@@ -6,6 +6,7 @@
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::layers::{LAYERS, Layer, LayerSet, Source};
+use crate::noise::Noise;
 use crate::options::Crop;
 use crate::relative::{mean, median_5x5, weighted, weights};
 use glam::{DVec3, Vec3};
@@ -176,42 +177,12 @@ impl Film {
         std::array::from_fn(|c| self.beauty(c))
     }
 
-    /// Estimated error of the image so far, from its two halves: the square root of the mean of V w, where
+    /// What the two halves tell of the image's noise: what each pixel adds to the squared error is V w, where
     /// V = (a − b)² n m / (n + m)² estimates the variance of a pixel's value from the means a, b of its n even and m odd samples
     /// (((a − b)/2)² for halves of one size), and w is the weight of the relative error at the image's 5 × 5 median.
     ///
-    /// `None` until every pixel has two samples. Unbiased (before the root) where the samples of the two halves are independent.
-    pub fn relative_error(&self) -> Option<f64> {
-        Some(mean_of(&self.squared_errors()?).sqrt())
-    }
-
-    /// How many samples each pixel should have so that the error becomes `target`, row by row: in proportion to the root of what a
-    /// sample's variance adds to the squared error, which needs the fewest in all. No pixel is told to have fewer than it has, or
-    /// more than `growth` times that.
-    ///
-    /// `None` until every pixel has two samples. The variances are means over 3 × 3 pixels: two halves tell little of one.
-    pub fn goals(&self, target: f64, growth: u32) -> Option<Vec<u32>> {
-        let (width, height) = (self.crop.width as usize, self.crop.height as usize);
-        let raw = self.squared_errors()?;
-        let squared = mean_3x3(&raw, width, height);
-        let taken = || self.counts.iter().map(|[n, m]| n + m);
-        let root: Vec<f64> = (squared.iter().zip(taken()))
-            .map(|(v, n)| (v * f64::from(n)).sqrt())
-            .collect();
-        // At the border smoothing may lose some of the error.
-        let lost = (mean_of(&raw) / mean_of(&squared)).max(1.0);
-        let scale = lost * mean_of(&root) / (target * target);
-        let goal = |(root, n): (&f64, u32)| {
-            let most = n.saturating_mul(growth);
-            let wanted = (root * scale).ceil().min(f64::from(most)) as u32;
-            // Even, so that the halves stay alike.
-            wanted.saturating_add(wanted & 1).max(n)
-        };
-        Some(root.iter().zip(taken()).map(goal).collect())
-    }
-
-    /// What each pixel adds to the squared error of the image, as far as noise goes.
-    fn squared_errors(&self) -> Option<Vec<f64>> {
+    /// `None` until every pixel has two samples. Unbiased where the samples of the two halves are independent.
+    pub fn noise(&self) -> Option<Noise> {
         if self.counts.iter().any(|n| n[0] == 0 || n[1] == 0) {
             return None;
         }
@@ -227,7 +198,16 @@ impl Film {
                 .sum::<f64>()
                 / 3.0
         });
-        Some(squared.collect())
+        Some(Noise {
+            width,
+            squared: squared.collect(),
+            taken: self.counts.iter().map(|[n, m]| n + m).collect(),
+        })
+    }
+
+    /// Estimated error of the image so far, as far as noise goes; see [`Film::noise`].
+    pub fn relative_error(&self) -> Option<f64> {
+        Some(self.noise()?.error())
     }
 
     /// Estimated variance of a pixel's colour from its two halves.
@@ -268,24 +248,6 @@ impl Film {
         let pixels = self.sums.chunks(self.stride).zip(&self.counts);
         pixels.map(move |(sums, n)| (sums[at] / f64::from((n[0] + n[1]).max(1))) as f32)
     }
-}
-
-fn mean_of(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-/// The mean of the 3 × 3 pixels around every pixel; fewer at the border.
-fn mean_3x3(values: &[f64], width: usize, height: usize) -> Vec<f64> {
-    let around = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
-    let pixel = |i: usize| {
-        let (rows, columns) = (around(i / width, height), around(i % width, width));
-        let n = rows.len() * columns.len();
-        let sum: f64 = rows
-            .flat_map(|y| columns.clone().map(move |x| values[y * width + x]))
-            .sum();
-        sum / n as f64
-    };
-    (0..values.len()).map(pixel).collect()
 }
 
 /// One row of a [`Film`].

@@ -198,10 +198,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
             // Light that media emit is sampled; all that scatters on the stretch or at its end is read.
             let end = (&ray, hit.as_ref());
             if field.end(world, end, &flight, (throughput, refused), sampler, visitor) {
-                if let Some(e) = emission::sample(world, &ray, &flight, sampler.next_1d()) {
-                    let vertex = Vertex::Medium(ray.at(e.t), &e.medium);
-                    visitor.light(throughput * e.value, Some(vertex), Source::Medium);
-                }
+                emitted(world, &ray, &flight, throughput, sampler.next_1d(), visitor);
                 return;
             }
             refused = true;
@@ -209,10 +206,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
         let lights = if first == FirstEvent::Any && !flight.segment().is_empty() {
             let [u, v] = sampler.next_2d();
             let w = sampler.next_2d();
-            if let Some(e) = emission::sample(world, &ray, &flight, v) {
-                let vertex = Vertex::Medium(ray.at(e.t), &e.medium);
-                visitor.light(throughput * e.value, Some(vertex), Source::Medium);
-            }
+            emitted(world, &ray, &flight, throughput, v, visitor);
             let lights = SegmentLight::new(world, &ray, &flight);
             if let (Some(lights), true) = (&lights, may_scatter(events)) {
                 scattered_once(world, lights, throughput, (u, v, w), visitor);
@@ -356,6 +350,21 @@ fn seen_environment<G: Geometry, L: Lights>(
             None,
             Source::Far(ray.direction),
         );
+    }
+}
+
+/// Light that media emit on the stretch, found at one distance chosen by `u`.
+fn emitted<'m, G: Geometry, L: Lights>(
+    world: &World<'m, G, L>,
+    ray: &Ray,
+    flight: &FreeFlight<'m>,
+    throughput: Vec3,
+    u: f32,
+    visitor: &mut impl Visitor,
+) {
+    if let Some(e) = emission::sample(world, ray, flight, u) {
+        let vertex = Vertex::Medium(ray.at(e.t), &e.medium);
+        visitor.light(throughput * e.value, Some(vertex), Source::Medium);
     }
 }
 

@@ -367,23 +367,27 @@ impl<'s> Run<'s> {
             if self.options.spp.is_some() || mean_samples >= f64::from(MOST_SAMPLES) {
                 return (tally, false);
             }
-            let error = match film.relative_error() {
-                Some(error) if error > target => error,
-                _ => return (tally, false),
+            let Some(noise) = film.noise() else {
+                return (tally, false);
             };
+            let error = noise.error();
+            // Where it is not a number there is nothing to aim at.
+            if error.is_nan() || error <= target {
+                return (tally, false);
+            }
             let next = match self.options.integrator {
                 // Samples that decide where more are taken would bias the ground truth.
                 Integrator::Path => {
                     let factor = (error / target).powi(2).clamp(1.1, f64::from(GROWTH));
                     let goal = (mean_samples * factor).ceil() as u32 + 1;
-                    Some(vec![goal.min(MOST_SAMPLES) & !1; pixels])
+                    vec![goal.min(MOST_SAMPLES) & !1; pixels]
                 }
-                Integrator::Cache => film.goals(target, GROWTH),
+                Integrator::Cache => noise.goals(target, GROWTH),
             };
-            match next {
-                Some(next) if next != goals => goals = next,
-                _ => return (tally, false),
+            if next == goals {
+                return (tally, false);
             }
+            goals = next;
         }
     }
 

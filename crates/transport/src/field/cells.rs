@@ -76,7 +76,8 @@ pub(super) struct Place {
     pub(super) kind: Kind,
 }
 
-/// Bits of a lattice coordinate in a key. Coordinates repeat every 2¹⁷ cells; cells of one size all lie closer to the eye.
+/// Bits of a lattice coordinate in a key. Coordinates repeat every 2¹⁷ cells; where widths grow with the distance to the eye, cells of
+/// one size all lie closer together.
 const BITS: u32 = 17;
 
 impl Place {

@@ -245,6 +245,22 @@ struct Asked {
 }
 
 impl Asked {
+    fn in_medium(p: Vec3) -> Self {
+        Self {
+            position: p,
+            kind: Kind::Medium,
+            normal: Vec3::ZERO,
+        }
+    }
+
+    fn on_surface(hit: &SurfaceHit) -> Self {
+        Self {
+            position: hit.position,
+            kind: Kind::facing(hit.normal),
+            normal: hit.normal,
+        }
+    }
+
     /// The place from where a cell of `width` metres is seen.
     fn eye(&self, width: f32) -> Vec3 {
         self.position + self.normal * (LIFT * width)
@@ -337,12 +353,7 @@ impl Field {
 
     /// `part` of the light in the medium at `p`, interpolated between the middles of cells; `None` where too little is known of it.
     pub fn medium<G: Geometry>(&self, geometry: &G, p: Vec3, part: Part) -> Option<FieldLight> {
-        let asked = Asked {
-            position: p,
-            kind: Kind::Medium,
-            normal: Vec3::ZERO,
-        };
-        let home = self.side_at(geometry, &asked)? as usize;
+        let home = self.side_at(geometry, &Asked::in_medium(p))? as usize;
         let place = self.cells.sides[home].place;
         let inv_width = 1.0 / width(place.exponent);
         let u = p * inv_width - 0.5;
@@ -392,12 +403,7 @@ impl Field {
         if hit.bsdf.is_shiny() {
             return None;
         }
-        let asked = Asked {
-            position: hit.position,
-            kind: Kind::facing(hit.normal),
-            normal: hit.normal,
-        };
-        let side = self.side_at(geometry, &asked)? as usize;
+        let side = self.side_at(geometry, &Asked::on_surface(hit))? as usize;
         let width = width(self.cells.sides[side].place.exponent);
         if !close && hit.t < CLOSE * width {
             return None;

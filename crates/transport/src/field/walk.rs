@@ -4,7 +4,7 @@
 //! it was handed itself.
 
 use super::Asked;
-use super::cells::{Kind, Light};
+use super::cells::Light;
 use crate::free_flight::FreeFlight;
 use crate::world::{Geometry, Lights, SurfaceHit, World};
 use crate::{direct, emission};
@@ -161,11 +161,7 @@ fn in_medium<G: Geometry, L: Lights>(
         (medium.sigma_s / medium.sigma_t.max(Vec3::splat(f32::MIN_POSITIVE))).max_element();
     let vertex = Vertex {
         found: Found {
-            place: Asked {
-                position: x,
-                kind: Kind::Medium,
-                normal: Vec3::ZERO,
-            },
+            place: Asked::in_medium(x),
             light: Light::direct(lit),
         },
         leaving: lit,
@@ -216,11 +212,7 @@ fn on_surface<G: Geometry, L: Lights>(
     });
     let vertex = Vertex {
         found: Found {
-            place: Asked {
-                position: hit.position,
-                kind: Kind::facing(hit.normal),
-                normal: hit.normal,
-            },
+            place: Asked::on_surface(hit),
             light: Light::direct(lit),
         },
         leaving,

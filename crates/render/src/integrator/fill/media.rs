@@ -2,7 +2,9 @@
 //!
 //! Their radii follow the lengths over which the field changes; none reaches past the walls around it.
 
-use super::{ATTEMPTS, Candidate, Counted, Kind, MORE_RAYS, quiet_enough};
+use super::{
+    ATTEMPTS, Candidate, Counted, Kind, MORE_RAYS, first_rays, quiet_enough, record, relative_slope,
+};
 use glam::Vec3;
 use tyndall_cache::{Cache, Record};
 use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
@@ -18,7 +20,7 @@ const POINTS_PER_RAY: u32 = 8;
 /// Radii at an error of 1, in lengths over which the field changes. On the shipped Cornell box at 256 × 192, error 0.03: 20 000
 /// records and 41 s of filling with 2, with 4 (and surfaces counting half) 1 200 records, 4 s, and half the error (2026-11-22).
 const RADIUS_GAIN: f32 = 4.0;
-/// Directions of a record at an error of 1: their number goes with the inverse square of the error.
+/// Directions of a record at an error of 1 go with the square of this; about eight records blend at a point.
 const RAYS_GAIN: f32 = 0.9;
 /// Smallest and largest radius as shares of the length over which the view looks into the fog.
 const RADIUS_RANGE: [f32; 2] = [0.01, 0.25];
@@ -56,8 +58,7 @@ impl<'s> Media<'s> {
         seed: u64,
         error: f32,
     ) -> Self {
-        // Noise falls with the error asked for, and about eight records blend at a point.
-        let n_rays = ((RAYS_GAIN / error).powi(2) as usize).clamp(128, 4096);
+        let n_rays = first_rays(RAYS_GAIN, error);
         Self {
             scene,
             frame,
@@ -157,13 +158,11 @@ impl Kind for Media<'_> {
         // are near on one side, and light does not end there. Edges count more: at half, the furnace was 0.25 % too bright.
         let edge = world.media.distance_to_boundary(x);
         let edge = if edge < g.nearest { 1.5 / edge } else { 0.0 };
-        let sum: f32 = g.value.element_sum();
-        let slope: f32 = g.gradient.iter().map(|d| d.length()).sum();
         let inverse = 0.5 / g.harmonic_mean_distance
             + 1.0 / world.lights.distance_to_point_lights(x)
             + edge
             + world.media.at(x).sigma_t.element_sum() / 3.0
-            + if sum > 0.0 { slope / sum } else { 0.0 };
+            + relative_slope(&g);
         // What is left of the interpolant's error grows with the square of the radius.
         let radius = (RADIUS_GAIN * self.error.sqrt()).clamp(0.1, 1.0) / inverse;
         let [least, most] = RADIUS_RANGE;
@@ -171,17 +170,7 @@ impl Kind for Media<'_> {
             .max(SMALLEST_FOOTPRINT * candidate.footprint)
             .clamp(least * self.view, most * self.view)
             .min(g.walls.beyond);
-        let variance = g.value_error * g.value_error;
-        let finite =
-            g.value.is_finite() && variance.is_finite() && g.gradient.iter().all(|d| d.is_finite());
-        let record = Record {
-            position: x,
-            radius: radius.max(f32::MIN_POSITIVE),
-            value: g.value.max(Vec3::ZERO).to_array(),
-            gradient: g.gradient,
-            variance: variance.to_array(),
-        };
-        finite.then_some((record, g.walls))
+        Some((record(x, radius, &g)?, g.walls))
     }
 }
 

@@ -51,6 +51,32 @@ fn quiet_enough(error: f32, gather: impl Fn(usize) -> Gathered) -> Gathered {
     }
 }
 
+/// Directions of the first attempt at a record: noise falls with the error asked for, from `gain` at an error of 1.
+fn first_rays(gain: f32, error: f32) -> usize {
+    ((gain / error).powi(2) as usize).clamp(128, 4096)
+}
+
+/// How fast a record's light changes per metre, relative to itself.
+fn relative_slope(g: &Gathered) -> f32 {
+    let sum: f32 = g.value.element_sum();
+    let slope: f32 = g.gradient.iter().map(|d| d.length()).sum();
+    if sum > 0.0 { slope / sum } else { 0.0 }
+}
+
+/// The record at `position` of what was gathered there; `None` where that is not finite.
+fn record(position: Vec3, radius: f32, g: &Gathered) -> Option<Record<3>> {
+    let variance = g.value_error * g.value_error;
+    let finite =
+        g.value.is_finite() && variance.is_finite() && g.gradient.iter().all(|d| d.is_finite());
+    finite.then(|| Record {
+        position,
+        radius: radius.max(f32::MIN_POSITIVE),
+        value: g.value.max(Vec3::ZERO).to_array(),
+        gradient: g.gradient,
+        variance: variance.to_array(),
+    })
+}
+
 /// What records of one kind are, and where they are wanted.
 pub(super) trait Kind: Sync {
     /// Where a record is valid within its ball.

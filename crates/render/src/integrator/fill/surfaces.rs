@@ -2,7 +2,10 @@
 //!
 //! They serve Lambertian surfaces; what shines is traced. Radii follow the harmonic mean distance to other surfaces (Ward et al. 1988).
 
-use super::{Candidate, Counted, Kind, MORE_RAYS, SAME_SURFACE, quiet_enough};
+use super::{
+    Candidate, Counted, Kind, MORE_RAYS, SAME_SURFACE, first_rays, quiet_enough, record,
+    relative_slope,
+};
 use glam::Vec3;
 use std::cell::Cell;
 use tyndall_cache::{Cache, Record};
@@ -13,7 +16,7 @@ use tyndall_transport::path::Reach;
 use tyndall_transport::walls::Walls;
 use tyndall_transport::world::{Geometry, SurfaceHit};
 
-/// Directions of a record at an error of 1: their number goes with the inverse square of the error.
+/// Directions of a record at an error of 1 go with the square of this.
 const RAYS_GAIN: f32 = 0.5;
 /// Radii at an error of 1, in harmonic mean distances.
 const RADIUS_GAIN: f32 = 2.0;
@@ -66,10 +69,6 @@ pub(in crate::integrator) struct Surfaces<'s> {
 }
 
 impl Surfaces<'_> {
-    fn n_rays(&self) -> usize {
-        ((RAYS_GAIN / self.error).powi(2) as usize).clamp(128, 4096)
-    }
-
     fn hit<G: Geometry>(geometry: &G, ray: &Ray) -> Option<SurfaceHit> {
         geometry
             .intersect(ray, f32::INFINITY)
@@ -116,33 +115,21 @@ impl Kind for Surfaces<'_> {
             index: SURFACE | index,
         };
         let g = quiet_enough(self.error, |attempt| {
-            let n_rays = self.n_rays() * MORE_RAYS.pow(attempt as u32);
+            let n_rays = first_rays(RAYS_GAIN, self.error) * MORE_RAYS.pow(attempt as u32);
             irradiance(&world, &hit, n_rays, self.reach, key)
         });
         let [least, most] = FOOTPRINTS.map(|n| n * candidate.footprint);
         // Lengths over which irradiance changes: to other surfaces, and its own relative gradient.
-        let sum: f32 = g.value.element_sum();
-        let slope: f32 = g.gradient.iter().map(|d| d.length()).sum();
-        let inverse = 1.0 / g.harmonic_mean_distance + if sum > 0.0 { slope / sum } else { 0.0 };
+        let inverse = 1.0 / g.harmonic_mean_distance + relative_slope(&g);
         let radius = (RADIUS_GAIN * self.error.sqrt()).clamp(0.05, 1.0) / inverse;
         let radius = radius.min(most).min(g.walls.beyond);
         let crowded = radius < least;
         let radius = radius.max(least);
-        let variance = g.value_error * g.value_error;
-        let finite =
-            g.value.is_finite() && variance.is_finite() && g.gradient.iter().all(|d| d.is_finite());
-        let record = Record {
-            position: hit.position,
-            radius: radius.max(f32::MIN_POSITIVE),
-            value: g.value.max(Vec3::ZERO).to_array(),
-            gradient: g.gradient,
-            variance: variance.to_array(),
-        };
         let side = Side {
             normal: hit.bsdf.normal(),
             walls: g.walls,
             crowded,
         };
-        finite.then_some((record, side))
+        Some((record(hit.position, radius, &g)?, side))
     }
 }
