@@ -21,6 +21,8 @@ pub enum Purpose {
     Probe = 5,
     /// Walks that fill a coarse field of light.
     Field = 6,
+    /// Camera samples that tell what an image is made of before it is made.
+    Pilot = 7,
 }
 
 /// Names a family of samples: `seed` of the run, what it is for, and which pixel, record or probe.

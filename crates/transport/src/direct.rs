@@ -1,9 +1,14 @@
-//! Light that arrives straight from the lights, by one sample of one light.
+//! Light that arrives straight from the lights: by one sample of one light, or of skies by a few samples of each.
 
 use crate::light_choice::LightChoice;
 use crate::single::unoccluded;
 use crate::world::{Geometry, LightSample, Lights, SurfaceHit, World};
 use glam::Vec3;
+
+/// Samples of each sky: few directions meet it where it is seen through windows, and shadow rays are the cheapest part of a vertex.
+const SKY_SAMPLES: u32 = 4;
+/// 1/Φ, whose multiples are spread most evenly over [0, 1).
+const INVERSE_GOLDEN_RATIO: f32 = 0.618_034;
 
 /// Light from one direction.
 #[derive(Clone, Copy, Debug)]
@@ -36,16 +41,85 @@ pub fn on_surface<G: Geometry, L: Lights>(
     sample(world, hit.position, Some(hit), choice, u)
 }
 
-fn sample<G: Geometry, L: Lights>(
+/// Numbers for all lights: one chooses a lamp, two a place on it, two a direction to the sky.
+pub(crate) type LightNumbers = (f32, [f32; 2], [f32; 2]);
+
+/// Samples of [`lamps`] and [`sky`] together.
+pub(crate) fn from_all<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    p: Vec3,
+    hit: Option<&SurfaceHit>,
+    (choice, lamp, to_sky): LightNumbers,
+) -> impl Iterator<Item = DirectSample> {
+    let lamp = lamps(world, p, hit, choice, lamp);
+    lamp.into_iter().chain(sky(world, p, hit, to_sky))
+}
+
+/// As [`in_medium`] without a surface and as [`on_surface`] on one, but for skies and environment images: see [`sky`].
+pub fn lamps<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     p: Vec3,
     hit: Option<&SurfaceHit>,
     choice: f32,
     u: [f32; 2],
 ) -> Option<DirectSample> {
+    let skies = world.lights.environment();
+    if skies.is_empty() {
+        return sample(world, p, hit, choice, u);
+    }
+    let (light, chance) = light_choice(world, p, hit).without(skies).sample(choice)?;
+    (!skies.contains(&light)).then(|| towards(world, p, hit, (light, chance), u))?
+}
+
+/// Light that arrives from skies and environment images at `p`, in a medium or on the surface at `hit`: the sum of the samples is an
+/// estimate.
+pub fn sky<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    p: Vec3,
+    hit: Option<&SurfaceHit>,
+    [u, v]: [f32; 2],
+) -> impl Iterator<Item = DirectSample> {
+    let spread = move |k: u32| {
+        let u = (u + k as f32 / SKY_SAMPLES as f32).fract();
+        [u, (v + k as f32 * INVERSE_GOLDEN_RATIO).fract()]
+    };
+    let skies = world.lights.environment().iter();
+    skies.flat_map(move |&light| {
+        let chance = SKY_SAMPLES as f32;
+        (0..SKY_SAMPLES).filter_map(move |k| towards(world, p, hit, (light, chance), spread(k)))
+    })
+}
+
+/// As [`in_medium`] without a surface and as [`on_surface`] on one.
+pub fn sample<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    p: Vec3,
+    hit: Option<&SurfaceHit>,
+    choice: f32,
+    u: [f32; 2],
+) -> Option<DirectSample> {
+    let chosen = light_choice(world, p, hit).sample(choice)?;
+    towards(world, p, hit, chosen, u)
+}
+
+fn light_choice<G, L: Lights>(
+    world: &World<'_, G, L>,
+    p: Vec3,
+    hit: Option<&SurfaceHit>,
+) -> LightChoice {
     let sigma = world.media.at(p).sigma_t.element_sum() / 3.0;
+    LightChoice::at(world.lights, p, hit.map(|hit| hit.normal), sigma)
+}
+
+/// One sample of a light that was chosen with a chance, or that as many samples are taken of.
+fn towards<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    p: Vec3,
+    hit: Option<&SurfaceHit>,
+    (light, chance): (usize, f32),
+    u: [f32; 2],
+) -> Option<DirectSample> {
     let normal = hit.map(|hit| hit.normal);
-    let (light, chance) = LightChoice::at(world.lights, p, normal, sigma).sample(choice)?;
     let s = world.lights.sample(light, p, u)?;
     if normal.is_some_and(|n| n.dot(s.w_i) <= 0.0) {
         return None;

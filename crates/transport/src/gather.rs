@@ -14,7 +14,7 @@ use std::f32::consts::{PI, TAU};
 use std::sync::OnceLock;
 use tyndall_math::spherical::{Border, SphericalVoronoi};
 use tyndall_math::{Key, Ray, Sampler, SphericalFibonacci, warp};
-use tyndall_media::MediumPoint;
+use tyndall_media::{MediumPoint, transmittance};
 
 /// Batches over which standard errors are taken. Paths are independent between them, directions are parts of one set: where the noise of
 /// paths is what counts the errors told are those found, and where light differs by direction alone they are overstated, at 1024
@@ -257,6 +257,43 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     key: Key,
 ) -> Gathered {
     let directions = GatherDirections::new(world, x, towards);
+    let what = What::Scattered(reach);
+    gather(world, x, directions, pattern, derivatives, what, key)
+}
+
+/// Gathers light at `x` that comes straight from skies and environment images, along `pattern`; weights all directions alike.
+pub fn sky<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    pattern: &GatherPattern,
+    key: Key,
+) -> Gathered {
+    let directions = GatherDirections {
+        lamps: LampDirections::default(),
+        lobe: None,
+    };
+    let aware = Derivatives::Aware;
+    gather(world, x, directions, pattern, aware, What::Sky, key)
+}
+
+/// Which light is gathered.
+#[derive(Clone, Copy, Debug)]
+enum What<'f> {
+    /// Light scattered or reflected before, along paths that go so far.
+    Scattered(Reach<'f>),
+    /// Light straight from skies and environment images.
+    Sky,
+}
+
+fn gather<'m, G: Geometry, L: Lights>(
+    world: &World<'m, G, L>,
+    x: Vec3,
+    directions: GatherDirections<'m>,
+    pattern: &GatherPattern,
+    derivatives: Derivatives,
+    what: What<'_>,
+    key: Key,
+) -> Gathered {
     let share = directions.lamps.share();
     let eighths = ((LAMP_EIGHTHS as f32 * share).ceil() as usize).min(LAMP_LEVELS - 1);
     let set = pattern.set(eighths);
@@ -287,7 +324,10 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
                     ray,
                     hit: Some(world.geometry.intersect(&ray, f32::INFINITY)),
                     first: FirstEvent::Any,
-                    reach: reach.behind_one(),
+                    reach: match what {
+                        What::Scattered(reach) => reach.behind_one(),
+                        What::Sky => Reach::default(),
+                    },
                 };
                 (start, direction)
             })
@@ -310,9 +350,11 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     let mut seen = Vec::with_capacity(set.directions.len());
     for (batch, starts) in starts.chunks(pattern.paths).enumerate() {
         for (i, (start, direction)) in starts.iter().enumerate() {
-            let mut sampler = sampler(batch, i);
             let mut visitor = WarpVisitor::new(world.media, x, radius, w_o);
-            trace(world, start, &mut sampler, &mut visitor);
+            match what {
+                What::Scattered(_) => trace(world, start, &mut sampler(batch, i), &mut visitor),
+                What::Sky => straight_from_sky(world, start, visitor.straight()),
+            }
             let weight = direction.weight;
             let [dr, dg, db] = visitor.gradient;
             batches.add(
@@ -359,6 +401,22 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
         nearest,
         harmonic_mean_distance: starts.len() as f32 / inverse,
         walls: Walls::new(starts.iter().filter_map(|(s, _)| s.hit.as_ref()?.as_ref())),
+    }
+}
+
+/// Tells `visitor` the light that comes straight along the first stretch of a path from skies and environment images.
+pub(crate) fn straight_from_sky<G, L: Lights>(
+    world: &World<'_, G, L>,
+    start: &Start<'_>,
+    visitor: &mut WarpVisitor<'_>,
+) {
+    if let Some(None) = start.hit {
+        let w_i = start.ray.direction;
+        let tau = world.media.optical_depth(&start.ray, f32::INFINITY);
+        for &light in world.lights.environment() {
+            let radiance = world.lights.environment_radiance(light, w_i);
+            visitor.light(transmittance(tau) * radiance, None, Source::Far(w_i));
+        }
     }
 }
 

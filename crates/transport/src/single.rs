@@ -135,10 +135,16 @@ impl<'f, 'm> SegmentLight<'f, 'm> {
             })
             .collect();
         if !taken.is_empty() {
-            self.taken = taken.iter().map(|&(light, _)| light).collect();
+            self.taken.extend(taken.iter().map(|&(light, _)| light));
             self.choice = self.choice.without(&self.taken);
         }
         taken
+    }
+
+    /// Takes skies and environment images from the lights to sample: someone else brings their light.
+    pub fn take_sky<L: Lights>(&mut self, lights: &L) {
+        self.taken.extend_from_slice(lights.environment());
+        self.choice = self.choice.without(&self.taken);
     }
 
     /// Whether lights are left for [`SegmentLight::sample`].

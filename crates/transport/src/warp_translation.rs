@@ -42,7 +42,8 @@ struct Leaving {
     rate: f32,
 }
 
-/// Accumulates value and gradient of the light that arrives at a point along one path, light straight from emitters left out.
+/// Accumulates value and gradient of the light that arrives at a point along one path, light straight from emitters left out unless told
+/// otherwise.
 pub(crate) struct WarpVisitor<'m> {
     media: &'m Media,
     center: Vec3,
@@ -52,6 +53,8 @@ pub(crate) struct WarpVisitor<'m> {
     leaving: Option<Leaving>,
     /// Whether any medium scatters otherwise than isotropically.
     lobes: bool,
+    /// Whether light straight from emitters counts.
+    straight: bool,
     /// Distance of the first vertex.
     first: Option<f32>,
     /// ∂ ln f of the path so far, per colour channel.
@@ -80,6 +83,7 @@ impl<'m> WarpVisitor<'m> {
             },
             leaving: towards.map(|w_o| Leaving { w_o, rate: 0.0 }),
             lobes: !media.is_isotropic(),
+            straight: false,
             first: None,
             log_gradient: [Vec3::ZERO; 3],
             value: Vec3::ZERO,
@@ -94,6 +98,12 @@ impl<'m> WarpVisitor<'m> {
         let mut visitor = Self::new(media, center, radius, None);
         visitor.last.normal = Some(normal);
         visitor
+    }
+
+    /// Counts light straight from emitters, too.
+    pub(crate) fn straight(&mut self) -> &mut Self {
+        self.straight = true;
+        self
     }
 
     /// Notes light that set out at `distance` along the first stretch.
@@ -236,8 +246,9 @@ impl Visitor for WarpVisitor<'_> {
     }
 
     fn light(&mut self, value: Vec3, last: Option<Vertex<'_, '_>>, source: Source) {
-        if self.first.is_none() && last.is_none() {
-            // Straight from an emitter: single scattering at the gather point, not ours.
+        let is_straight = self.first.is_none() && last.is_none();
+        if is_straight && !self.straight {
+            // Single scattering at the gather point is not ours.
             return;
         }
         let mut log_gradient = self.log_gradient;
@@ -276,9 +287,11 @@ impl Visitor for WarpVisitor<'_> {
                 }
             }
         }
-        let set_out = self
-            .first
-            .unwrap_or_else(|| from.position.distance(self.center));
+        let set_out = match (self.first, source) {
+            (Some(first), _) => first,
+            (None, Source::Far(_)) if is_straight => f32::INFINITY,
+            (None, _) => from.position.distance(self.center),
+        };
         self.arrive(set_out, value);
         self.value += value;
         for c in 0..3 {

@@ -9,15 +9,17 @@ use super::fill::surfaces::{self, SurfaceCache};
 use crate::film::Pixel;
 use glam::Vec3;
 use std::cell::Cell;
+use std::f32::consts::FRAC_1_PI;
 use tyndall_math::{Ray, Sampler};
 use tyndall_scene::{LightSet, Scene};
+use tyndall_transport::field::{Field, Part};
 use tyndall_transport::free_flight::FreeFlight;
 use tyndall_transport::gather;
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
 use tyndall_transport::shafts::Shafts;
 use tyndall_transport::single::SegmentLight;
-use tyndall_transport::world::{Geometry, SurfaceHit, World};
+use tyndall_transport::world::{Geometry, Lights, SurfaceHit, World};
 use tyndall_transport::{direct, emission};
 
 /// Probes along each camera ray for the shadows of lights without extent. In the hall (2026-11) the error of its shafts
@@ -32,6 +34,7 @@ const MAKESHIFT: f32 = 0.05;
 /// Parts of a camera sample's work beside the path behind the first surface; each has numbers of its own.
 const FOG_PART: u64 = 1;
 const PATHS_PART: u64 = 2;
+const SKY_PART: u64 = 3;
 
 /// Scattering events that light of the `multiple` layer has had at least: media's own emission needs only the last.
 pub(crate) fn least_multiple_depth(scene: &Scene) -> u32 {
@@ -44,6 +47,8 @@ pub(crate) enum Multiple<'c> {
     None,
     /// Interpolated from records.
     Records(&'c MediaCache),
+    /// Read from the coarse field.
+    Field(&'c Field),
     /// Path traced.
     Paths,
 }
@@ -51,7 +56,9 @@ pub(crate) enum Multiple<'c> {
 /// What was computed before the image.
 pub(crate) struct Known<'c> {
     pub(crate) multiple: Multiple<'c>,
-    /// Indirect light on surfaces, where records hold it.
+    /// Single scattering of light from skies, where records hold it.
+    pub(crate) sky: Option<&'c MediaCache>,
+    /// Light on surfaces, where records hold it: indirect, and where there are records of light from skies that, too.
     pub(crate) indirect: Option<&'c SurfaceCache>,
 }
 
@@ -167,13 +174,25 @@ impl<'s> Camera<'s> {
             return pixel;
         }
         if self.may_scatter(1) {
-            pixel.single = self.single(&world, &ray, &flight, sampler);
+            pixel.single = self.single(&world, &ray, &flight, known, sampler);
         }
         if self.may_scatter(least_multiple_depth(self.scene)) {
             match known.multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    pixel.multiple = self.interpolated(&world, &ray, &flight, cache, sampler);
+                    let read = |x, t, path: &mut Sampler| {
+                        self.read(cache, (x, t), path, |path| {
+                            gather::one(&world, x, self.reach, path)
+                        })
+                    };
+                    pixel.multiple = self.scattered(&ray, &flight, sampler, read);
+                }
+                Multiple::Field(field) => {
+                    let read = |x, _, path: &mut Sampler| {
+                        let known = field.medium(world.geometry, x, Part::Indirect);
+                        known.map_or_else(|| gather::one(&world, x, self.reach, path), |l| l.value)
+                    };
+                    pixel.multiple = self.scattered(&ray, &flight, sampler, read);
                 }
                 Multiple::Paths => {
                     pixel.multiple = self
@@ -183,6 +202,27 @@ impl<'s> Camera<'s> {
             }
         }
         pixel
+    }
+
+    /// The part of single scattering that is light from skies, by a sample of pixel (x, y) that looks for nothing else.
+    pub(crate) fn sky(&self, x: u32, y: u32, sampler: &mut Sampler) -> Vec3 {
+        let world = self.geometry.world(self.scene);
+        if world.lights.environment().is_empty() {
+            return Vec3::ZERO;
+        }
+        let ray = self.ray(x, y, sampler);
+        let hit = world.geometry.intersect(&ray, f32::INFINITY);
+        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
+        let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+        if !flight.can_stop() {
+            return Vec3::ZERO;
+        }
+        self.scattered(
+            &ray,
+            &flight,
+            &mut sampler.branch(FOG_PART),
+            |x, _, sampler| from_sky(&world, x, sampler),
+        )
     }
 
     /// What the first surface sends to the eye, or the environment.
@@ -205,7 +245,13 @@ impl<'s> Camera<'s> {
         };
         let w_o = -ray.direction;
         let choice = sampler.next_1d();
-        let direct = direct::on_surface(world, &hit, choice, sampler.next_2d())
+        let lights = if known.sky.is_some() {
+            direct::lamps
+        } else {
+            direct::sample
+        };
+        let u = sampler.next_2d();
+        let direct = lights(world, hit.position, Some(&hit), choice, u)
             .map_or(Vec3::ZERO, |s| hit.bsdf.eval(w_o, s.w_i) * s.radiance);
         flight.transmittance() * (hit.emission + direct + hit.bsdf.albedo(w_o) * indirect)
     }
@@ -238,12 +284,23 @@ impl<'s> Camera<'s> {
         world: &World<'w, Counted<'_>, LightSet>,
         ray: &Ray,
         flight: &FreeFlight<'w>,
+        known: &Known<'_>,
         sampler: &mut Sampler,
     ) -> Vec3 {
         let Some(mut lights) = SegmentLight::new(world, ray, flight) else {
             return Vec3::ZERO;
         };
         let mut shafts = Vec3::ZERO;
+        if let Some(cache) = known.sky {
+            lights.take_sky(world.lights);
+            let sampler = &mut sampler.branch(SKY_PART);
+            let read = |x, t, sampler: &mut Sampler| {
+                self.read(cache, (x, t), sampler, |sampler| {
+                    from_sky(world, x, sampler)
+                })
+            };
+            shafts += self.scattered(ray, flight, sampler, read);
+        }
         for (light, probes) in lights.take_shafts(world.lights, SHAFT_PROBES) {
             let shaft = Shafts::new(world, ray, flight, light);
             shafts += shaft.radiance(probes, sampler.next_1d());
@@ -265,38 +322,49 @@ impl<'s> Camera<'s> {
         shafts + sum / SINGLE_SAMPLES as f32
     }
 
-    fn interpolated<'w>(
+    /// Light scattered in media towards the origin of `ray`, where `read` knows in-scattered radiance at a place and its distance.
+    fn scattered(
         &self,
-        world: &World<'w, Counted<'_>, LightSet>,
         ray: &Ray,
-        flight: &FreeFlight<'w>,
-        cache: &MediaCache,
+        flight: &FreeFlight<'_>,
         sampler: &mut Sampler,
+        read: impl Fn(Vec3, f32, &mut Sampler) -> Vec3,
     ) -> Vec3 {
         let media = &self.scene.media;
         let offset = sampler.next_1d();
         let mut sum = Vec3::ZERO;
-        let (mut looked, mut missed) = (0, 0);
         for i in 0..MULTIPLE_SAMPLES {
             let Some(t) = flight.sample_inside((i as f32 + offset) / MULTIPLE_SAMPLES as f32)
             else {
                 continue;
             };
             let x = ray.at(t);
-            looked += 1;
-            let radiance = media::lookup(cache, x).unwrap_or_else(|| {
-                missed += 1;
-                // The nearest record is a little off here, and a path would be noisy.
-                media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| {
-                    let mut path = sampler.branch(u64::from(i));
-                    gather::one(world, x, self.reach, &mut path)
-                })
-            });
+            let radiance = read(x, t, &mut sampler.branch(u64::from(i)));
             let stop = flight.stop(t);
             sum += stop.transmittance * media.at(x).sigma_s * radiance / flight.pdf_inside(&stop);
         }
-        self.lookups.set(self.lookups.get() + looked);
-        self.missed.set(self.missed.get() + missed);
         sum / MULTIPLE_SAMPLES as f32
     }
+
+    /// What `cache` knows of light at `x`, which is `t` metres from the eye; where it knows nothing, what `trace` finds.
+    fn read(
+        &self,
+        cache: &MediaCache,
+        (x, t): (Vec3, f32),
+        sampler: &mut Sampler,
+        trace: impl Fn(&mut Sampler) -> Vec3,
+    ) -> Vec3 {
+        self.lookups.set(self.lookups.get() + 1);
+        media::lookup(cache, x).unwrap_or_else(|| {
+            self.missed.set(self.missed.get() + 1);
+            // The nearest record is a little off here, and a path would be noisy.
+            media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| trace(sampler))
+        })
+    }
+}
+
+/// In-scattered radiance at `x` of light straight from skies, where media scatter alike in all directions.
+fn from_sky(world: &World<'_, Counted<'_>, LightSet>, x: Vec3, sampler: &mut Sampler) -> Vec3 {
+    let samples = direct::sky(world, x, None, sampler.next_2d());
+    samples.map(|s| s.radiance).sum::<Vec3>() * (0.25 * FRAC_1_PI)
 }

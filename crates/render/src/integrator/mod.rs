@@ -7,6 +7,7 @@ mod counted;
 mod estimate;
 mod field;
 mod fill;
+mod pilot;
 
 use crate::error::RenderError;
 use crate::film::{Film, FilmRow, Pixel};
@@ -17,10 +18,11 @@ use crate::stats::{Stats, peak_rss_mib};
 use camera::{Camera, Known, Multiple, Tally, least_multiple_depth};
 use estimate::Estimate;
 use field::FilledField;
-use fill::media::Media;
+use fill::media::{Holds, Media};
 use fill::surfaces::Surfaces;
 use fill::{Fill, Filled, Kind};
 use glam::Vec3;
+use pilot::{Pilot, Plan};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -152,34 +154,40 @@ impl<'s> Run<'s> {
             max_depth: self.max_depth,
             field: field.as_ref().map(|filled| &filled.field),
         };
-        let filled = (way == Way::Records).then(|| {
-            self.fill(Media::new(
-                self.scene,
-                self.frame,
-                reach,
-                self.options.seed,
-                self.error,
-            ))
-        });
-        let indirect = self.has_surface_records(way).then(|| {
+        let plan = self.has_records(way).then(|| self.plan(way, reach));
+        let media = |holds, error| {
+            let seed = self.options.seed;
+            self.fill(Media::new(self.scene, self.frame, holds, seed, error))
+        };
+        let multiple = plan
+            .filter(|_| way == Way::Records)
+            .map(|plan| media(Holds::Multiple(reach), plan.multiple));
+        let sky = plan
+            .filter(|_| self.may_hold_sky())
+            .and_then(|plan| Some(media(Holds::Sky, plan.sky?)));
+        let indirect = plan.filter(|_| self.has_surface_records(way)).map(|plan| {
             self.fill(Surfaces {
                 scene: self.scene,
                 frame: self.frame,
                 reach,
                 seed: self.options.seed,
-                error: self.error,
+                sky: sky.is_some(),
+                error: plan.surface,
             })
         });
-        let cut_short = filled.as_ref().is_some_and(|filled| filled.cut_short)
+        let cut_short = multiple.as_ref().is_some_and(|filled| filled.cut_short)
+            || sky.as_ref().is_some_and(|filled| filled.cut_short)
             || indirect.as_ref().is_some_and(|filled| filled.cut_short)
             || field.as_ref().is_some_and(|filled| filled.cut_short);
         if let Some(filled) = &field {
             stats.rays += filled.rays;
         }
-        if let Some(filled) = &filled {
-            stats.rays += filled.rays;
-            let count = filled.cache.len() as u64;
-            stats.records.insert("multiple".to_owned(), count);
+        for (name, filled) in [("multiple", &multiple), ("single", &sky)] {
+            if let Some(filled) = filled {
+                stats.rays += filled.rays;
+                let count = filled.cache.len() as u64;
+                stats.records.insert(name.to_owned(), count);
+            }
         }
         if let Some(filled) = &indirect {
             stats.rays += filled.rays;
@@ -190,11 +198,12 @@ impl<'s> Run<'s> {
 
         let rendering = Instant::now();
         let known = Known {
-            multiple: match (&filled, way) {
+            multiple: match (&multiple, way) {
                 (Some(filled), _) => Multiple::Records(&filled.cache),
                 (None, Way::Paths) => Multiple::Paths,
                 (None, _) => Multiple::None,
             },
+            sky: sky.as_ref().map(|filled| &filled.cache),
             indirect: indirect.as_ref().map(|filled| &filled.cache),
         };
         let (tally, timed_out) = self.sample(&mut film, &known, reach);
@@ -251,13 +260,18 @@ impl<'s> Run<'s> {
                     .to_owned(),
             );
         }
-        let surface = grouped(stats.records.get("surface").copied().unwrap_or(0));
+        let count = |kind: &str| grouped(stats.records.get(kind).copied().unwrap_or(0));
+        let surface = count("surface");
+        let single = match &sky {
+            Some(_) => format!("{} records of skies, else direct", count("single")),
+            None => "direct".to_owned(),
+        };
         let found = match way {
             Way::PathIntegrator => "integrator: path".to_owned(),
-            Way::NoMultiple => format!("records: {surface} surface; single: direct; SH: off"),
+            Way::NoMultiple => format!("records: {surface} surface; single: {single}; SH: off"),
             Way::Records => format!(
-                "records: {} multiple, {surface} surface; single: direct; SH: off",
-                grouped(stats.records["multiple"])
+                "records: {} multiple, {surface} surface; single: {single}; SH: off",
+                count("multiple")
             ),
             Way::Paths => {
                 "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
@@ -265,7 +279,10 @@ impl<'s> Run<'s> {
         };
         let mut image = film.image();
         if let Some(points) = image.channels.get_mut("records") {
-            let media = filled.iter().flat_map(|filled| &filled.pixels);
+            let media = multiple
+                .iter()
+                .chain(&sky)
+                .flat_map(|filled| &filled.pixels);
             let surfaces = indirect.iter().flat_map(|filled| &filled.pixels);
             mark_records(media.chain(surfaces), self.crop, points);
         }
@@ -319,6 +336,35 @@ impl<'s> Run<'s> {
     /// Whether indirect light on surfaces is read from records: where paths of these can end in a field.
     fn has_surface_records(&self, way: Way) -> bool {
         self.has_field(way) && !self.scene.geometry.is_empty()
+    }
+
+    fn has_records(&self, way: Way) -> bool {
+        way == Way::Records || self.has_surface_records(way) || self.may_hold_sky()
+    }
+
+    /// Whether light straight from skies may be read from records: where surfaces hide most of them, few samples find it.
+    fn may_hold_sky(&self) -> bool {
+        let media = &self.scene.media;
+        self.options.integrator == Integrator::Cache
+            && self.max_depth.is_none()
+            && media.is_isotropic()
+            && self.scene.lights.has_even_skies()
+            && !self.scene.geometry.is_empty()
+    }
+
+    /// How far records may be off.
+    fn plan(&self, way: Way, reach: Reach<'_>) -> Plan {
+        let known = Known {
+            multiple: match (way, reach.field) {
+                (Way::Records, Some(field)) => Multiple::Field(field),
+                (Way::Records | Way::Paths, _) => Multiple::Paths,
+                _ => Multiple::None,
+            },
+            sky: None,
+            indirect: None,
+        };
+        let camera = || Camera::new(self.scene, self.frame, reach);
+        Pilot::new(camera, self.frame, &known, self.options.seed).plan(self.error)
     }
 
     fn field(&self) -> FilledField {

@@ -12,6 +12,9 @@ use tyndall_transport::LightSample;
 /// Largest radiance of a texel, W/(m² sr); the sun's disc has 2·10⁷.
 const BRIGHTEST: f32 = 1e30;
 
+/// Radiance of the brightest texel over the mean, up to which an image is even.
+const EVEN: f32 = 10.0;
+
 /// An equirectangular image of radiance, W/(m² sr), row 0 towards +Y.
 #[derive(Clone, Debug)]
 pub struct EnvironmentImage {
@@ -98,6 +101,8 @@ pub struct EnvironmentLight {
     /// Density over (u, v) of a texel with channels that sum to 1, for each row.
     row_densities: Vec<f32>,
     fluence: Vec3,
+    /// Greatest radiance of a texel, mean of the channels.
+    brightest: f32,
 }
 
 impl EnvironmentLight {
@@ -107,6 +112,11 @@ impl EnvironmentLight {
             // Bounded, so that sums over the image stay finite.
             *texel = (*texel * scale).min(Vec3::splat(BRIGHTEST));
         }
+        let brightest = image
+            .texels
+            .iter()
+            .map(|&texel| mean(texel))
+            .fold(0.0, f32::max);
         let (width, height) = image.size();
         // ΔφΔcosθ, in which the difference of cosines is 2 sin θ sin(Δθ/2) at the middle of the row.
         let row_angle = std::f64::consts::PI / height as f64;
@@ -133,6 +143,7 @@ impl EnvironmentLight {
             image,
             rotation,
             fluence: fluence.as_vec3(),
+            brightest,
         }
     }
 
@@ -144,6 +155,12 @@ impl EnvironmentLight {
     /// Integral of the radiance over all directions, W/m².
     pub fn fluence(&self) -> Vec3 {
         self.fluence
+    }
+
+    /// Whether no part of the image is much brighter than the mean, as a sun would be: directions drawn evenly then meet its light as well
+    /// as any.
+    pub fn is_even(&self) -> bool {
+        self.brightest <= EVEN * mean(self.fluence) / (4.0 * PI)
     }
 
     /// Radiance from direction `w_i`, W/(m² sr).

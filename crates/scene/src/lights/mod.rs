@@ -199,6 +199,15 @@ impl LightSet {
         &self.lights
     }
 
+    /// Whether there are skies or environment images, and no part of them is much brighter than the rest.
+    pub fn has_even_skies(&self) -> bool {
+        let is_even = |&light: &usize| match &self.lights[light] {
+            Light::Environment(light) => light.is_even(),
+            _ => true,
+        };
+        !self.environment.is_empty() && self.environment.iter().all(is_even)
+    }
+
     fn push(&mut self, light: Light) {
         match &light {
             Light::Point(point) => self.point_positions.push(point.position()),

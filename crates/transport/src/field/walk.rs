@@ -5,9 +5,10 @@
 
 use super::Asked;
 use super::cells::Light;
+use crate::direct::{self, LightNumbers};
+use crate::emission;
 use crate::free_flight::FreeFlight;
 use crate::world::{Geometry, Lights, SurfaceHit, World};
-use crate::{direct, emission};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 use tyndall_math::{Frame, Ray, Sampler, warp};
@@ -23,7 +24,7 @@ const SURVIVAL_MIN: f32 = 0.1;
 /// Free flights follow each channel at least this much as the brightest.
 const LEAST_CHANNEL: f32 = 0.1;
 /// Sets of four sample dimensions for each stretch.
-const SETS_PER_STRETCH: u32 = 2;
+const SETS_PER_STRETCH: u32 = 3;
 
 /// Light found at one place.
 #[derive(Clone, Copy, Debug)]
@@ -77,17 +78,18 @@ pub(super) fn walk<G: Geometry, L: Lights>(
         let w_o = -ray.direction;
         let light = sampler.next_2d();
         let direction = sampler.next_2d();
+        let lights = (choice, light, sampler.next_2d());
         let next = match (flight.sample(free), &hit) {
             (Some(t), _) => {
                 let stop = flight.stop(t);
                 let x = ray.at(t);
                 let medium = world.media.at(x);
                 let stretch = stop.transmittance * medium.sigma_s / flight.pdf(&stop);
-                in_medium(world, x, &medium, (w_o, stretch), choice, light, direction)
+                in_medium(world, x, &medium, (w_o, stretch), lights, direction)
             }
             (None, Some(hit)) => {
                 let stretch = flight.transmittance() / flight.pass();
-                on_surface(world, hit, (w_o, stretch), choice, light, direction)
+                on_surface(world, hit, (w_o, stretch), lights, direction)
             }
             (None, None) => {
                 if let Some(last) = vertices.last_mut() {
@@ -149,12 +151,12 @@ fn in_medium<G: Geometry, L: Lights>(
     x: Vec3,
     medium: &MediumPoint<'_>,
     (w_o, stretch): (Vec3, Vec3),
-    choice: f32,
-    light: [f32; 2],
+    lights: LightNumbers,
     direction: [f32; 2],
 ) -> (Vertex, Onward) {
-    let lit = direct::in_medium(world, x, choice, light)
-        .map_or(Vec3::ZERO, |s| medium.phase(w_o, s.w_i).value * s.radiance);
+    let lit: Vec3 = direct::from_all(world, x, None, lights)
+        .map(|s| medium.phase(w_o, s.w_i).value * s.radiance)
+        .sum();
     let (w_i, pdf) = medium.sample_phase(w_o, direction);
     let weight = medium.phase(w_o, w_i).value / pdf;
     let albedo =
@@ -177,26 +179,23 @@ fn on_surface<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     hit: &SurfaceHit,
     (w_o, stretch): (Vec3, Vec3),
-    choice: f32,
-    light: [f32; 2],
+    lights: LightNumbers,
     [u, v]: [f32; 2],
 ) -> (Vertex, Onward) {
     // Rough, so that no chance reflection of a light outshines a cell.
     let bsdf = hit.bsdf.roughened();
     let normal = bsdf.normal();
     let cosine = |w: Vec3| FRAC_1_PI * normal.dot(w).max(0.0);
-    let (lit, leaving) =
-        direct::on_surface(world, hit, choice, light).map_or((Vec3::ZERO, Vec3::ZERO), |s| {
-            (
-                s.radiance * cosine(s.w_i),
-                s.radiance * bsdf.eval(w_o, s.w_i),
-            )
-        });
+    let (mut lit, mut leaving) = (Vec3::ZERO, Vec3::ZERO);
+    for s in direct::from_all(world, hit.position, Some(hit), lights) {
+        lit += s.radiance * cosine(s.w_i);
+        leaving += s.radiance * bsdf.eval(w_o, s.w_i);
+    }
     // Gloss asks for directions of its own; half of them keep to the cosine, which bounds the weight of irradiance.
     let gloss = if bsdf.is_lambert() { 0.0 } else { 0.5 };
     let w_i = if u < gloss {
         // The number that chose the light may choose the lobe: the two ways of light only add up.
-        bsdf.sample(w_o, choice, [u / gloss, v]).map(|s| s.w_i)
+        bsdf.sample(w_o, lights.0, [u / gloss, v]).map(|s| s.w_i)
     } else {
         let u = ((u - gloss) / (1.0 - gloss)).min(1.0 - f32::EPSILON);
         let local = warp::cosine_hemisphere([u, v]);

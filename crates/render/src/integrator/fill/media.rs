@@ -1,4 +1,4 @@
-//! Records of multiple scattering in media.
+//! Records of light scattered in media: multiple scattering, or light straight from skies.
 //!
 //! Their radii follow the lengths over which the field changes; none reaches past the walls around it.
 
@@ -22,6 +22,10 @@ const POINTS_PER_RAY: u32 = 8;
 const RADIUS_GAIN: f32 = 4.0;
 /// Directions of a record at an error of 1 go with the square of this; about eight records blend at a point.
 const RAYS_GAIN: f32 = 0.9;
+/// As [`RAYS_GAIN`] for light from skies, whose rays cost little and find it through windows alone.
+const SKY_RAYS_GAIN: f32 = 1.8;
+/// Keeps the random numbers of records of skies from those of multiple scattering.
+const SKY: u64 = 1 << 41;
 /// Smallest and largest radius as shares of the length over which the view looks into the fog.
 const RADIUS_RANGE: [f32; 2] = [0.01, 0.25];
 /// Smallest radius in pixels seen from the camera: detail below half a pixel is averaged away. A whole pixel was too much:
@@ -36,11 +40,20 @@ const CLEARANCE_RAYS: u64 = 32;
 /// A cache of light in media; records are tagged with the walls they do not reach past.
 pub(in crate::integrator) type MediaCache = Cache<3, Walls>;
 
-/// Multiple scattering along the camera's rays.
+/// What records in media hold.
+#[derive(Clone, Copy)]
+pub(in crate::integrator) enum Holds<'s> {
+    /// Multiple scattering, along paths that go so far.
+    Multiple(Reach<'s>),
+    /// Single scattering of light from skies and environment images.
+    Sky,
+}
+
+/// Light scattered along the camera's rays.
 pub(in crate::integrator) struct Media<'s> {
     scene: &'s Scene,
     frame: [u32; 2],
-    reach: Reach<'s>,
+    holds: Holds<'s>,
     seed: u64,
     error: f32,
     /// Directions of each attempt at a record.
@@ -50,19 +63,23 @@ pub(in crate::integrator) struct Media<'s> {
 }
 
 impl<'s> Media<'s> {
-    /// For a target `error` of the image.
+    /// For a target `error` of what the records hold.
     pub(in crate::integrator) fn new(
         scene: &'s Scene,
         frame: [u32; 2],
-        reach: Reach<'s>,
+        holds: Holds<'s>,
         seed: u64,
         error: f32,
     ) -> Self {
-        let n_rays = first_rays(RAYS_GAIN, error);
+        let gain = match holds {
+            Holds::Multiple(_) => RAYS_GAIN,
+            Holds::Sky => SKY_RAYS_GAIN,
+        };
+        let n_rays = first_rays(gain, error);
         Self {
             scene,
             frame,
-            reach,
+            holds,
             seed,
             error,
             patterns: std::array::from_fn(|attempt| {
@@ -142,7 +159,10 @@ impl Kind for Media<'_> {
         let key = Key {
             seed: self.seed,
             purpose: Purpose::Record,
-            index,
+            index: match self.holds {
+                Holds::Multiple(_) => index,
+                Holds::Sky => SKY | index,
+            },
         };
         // Moved, a record may miss the point that asked for it.
         let x = if round == 0 {
@@ -151,7 +171,11 @@ impl Kind for Media<'_> {
             candidate.position
         };
         let g = quiet_enough(self.error, |attempt| {
-            gather::multiple(&world, x, &self.patterns[attempt], self.reach, key)
+            let pattern = &self.patterns[attempt];
+            match self.holds {
+                Holds::Multiple(reach) => gather::multiple(&world, x, pattern, reach, key),
+                Holds::Sky => gather::sky(&world, x, pattern, key),
+            }
         });
         // Lengths over which the field changes: to surfaces, to lamps, to the edge of a medium (where the field falls off
         // ever faster) unless it lies behind a surface, a free path, and its own relative gradient. Surfaces count half: they

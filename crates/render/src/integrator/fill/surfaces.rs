@@ -1,4 +1,4 @@
-//! Records of indirect irradiance on surfaces.
+//! Records of irradiance on surfaces, by indirect light and by even skies.
 //!
 //! They serve Lambertian surfaces; what shines is traced. Radii follow the harmonic mean distance to other surfaces (Ward et al. 1988).
 
@@ -64,7 +64,9 @@ pub(in crate::integrator) struct Surfaces<'s> {
     pub(in crate::integrator) frame: [u32; 2],
     pub(in crate::integrator) reach: Reach<'s>,
     pub(in crate::integrator) seed: u64,
-    /// Target error of the image.
+    /// Whether light straight from skies is held, too.
+    pub(in crate::integrator) sky: bool,
+    /// Target error of what the records hold.
     pub(in crate::integrator) error: f32,
 }
 
@@ -116,7 +118,7 @@ impl Kind for Surfaces<'_> {
         };
         let g = quiet_enough(self.error, |attempt| {
             let n_rays = first_rays(RAYS_GAIN, self.error) * MORE_RAYS.pow(attempt as u32);
-            irradiance(&world, &hit, n_rays, self.reach, key)
+            irradiance(&world, &hit, n_rays, self.sky, self.reach, key)
         });
         let [least, most] = FOOTPRINTS.map(|n| n * candidate.footprint);
         // Lengths over which irradiance changes: to other surfaces, and its own relative gradient.
