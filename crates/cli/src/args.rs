@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
 use tyndall_render::layers::LayerSet;
-use tyndall_render::options::{Crop, Depth, Integrator};
+use tyndall_render::options::{Crop, Depth, Integrator, MultipleFrom, SingleFrom};
 use tyndall_render::probe::Derivatives;
 use tyndall_scene::Fog;
 
@@ -43,6 +43,12 @@ pub(crate) struct RenderArgs {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) integrator: IntegratorArg,
+    /// Where multiple scattering comes from: records, the coarse field that they end in, or whichever does.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) multiple: MultipleArg,
+    /// Where single scattering of light from skies comes from: samples, records, or whichever is cheaper.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) single: SingleArg,
     /// Target error of the image, such as 0.03; samples per pixel and cache tolerance follow from it.
     #[arg(long, value_name = "E", value_parser = value::finite, allow_negative_numbers = true)]
     pub(crate) error: Option<f32>,
@@ -214,6 +220,50 @@ impl From<DerivativesArg> for Derivatives {
         match arg {
             DerivativesArg::Aware => Derivatives::Aware,
             DerivativesArg::Blind => Derivatives::Blind,
+        }
+    }
+}
+
+/// [`MultipleFrom`] on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MultipleArg {
+    /// the coarse field where it is good enough, else records
+    #[default]
+    Auto,
+    /// interpolated records
+    Records,
+    /// the coarse field, however good it is
+    Field,
+}
+
+impl From<MultipleArg> for MultipleFrom {
+    fn from(arg: MultipleArg) -> Self {
+        match arg {
+            MultipleArg::Auto => MultipleFrom::Auto,
+            MultipleArg::Records => MultipleFrom::Records,
+            MultipleArg::Field => MultipleFrom::Field,
+        }
+    }
+}
+
+/// [`SingleFrom`] on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SingleArg {
+    /// records for light from skies where there is enough of it, samples for all other light
+    #[default]
+    Auto,
+    /// samples of the lights
+    Direct,
+    /// records for light from skies, samples for all other light
+    Cache,
+}
+
+impl From<SingleArg> for SingleFrom {
+    fn from(arg: SingleArg) -> Self {
+        match arg {
+            SingleArg::Auto => SingleFrom::Auto,
+            SingleArg::Direct => SingleFrom::Direct,
+            SingleArg::Cache => SingleFrom::Cache,
         }
     }
 }

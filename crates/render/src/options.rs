@@ -38,6 +38,30 @@ impl Integrator {
     }
 }
 
+/// Where camera rays find multiple scattering.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MultipleFrom {
+    /// The coarse field itself where it is good enough, else records.
+    #[default]
+    Auto,
+    /// Records.
+    Records,
+    /// The coarse field itself, however good it is.
+    Field,
+}
+
+/// Where camera rays find single scattering of light from skies; that of all other light is always computed where it is needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SingleFrom {
+    /// Records where there is enough of that light to be worth them.
+    #[default]
+    Auto,
+    /// Samples of the lights.
+    Direct,
+    /// Records.
+    Cache,
+}
+
 /// How often light may scatter, in media or at surfaces, between light and eye.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Depth {
@@ -137,6 +161,10 @@ impl FromStr for Crop {
 pub struct RenderOptions {
     /// How light is computed.
     pub integrator: Integrator,
+    /// Where camera rays find multiple scattering.
+    pub multiple: MultipleFrom,
+    /// Where camera rays find single scattering.
+    pub single: SingleFrom,
     /// Target error of the image, the square root of its relMSE.
     pub error: Option<f32>,
     /// Samples per pixel, instead of a target error.

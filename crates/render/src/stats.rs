@@ -36,6 +36,9 @@ pub struct Stats {
     pub peak_rss_mib: Option<f64>,
     /// Number of threads used.
     pub threads: usize,
+    /// What each part of the work is believed to add to the image's error, in squares: the noise of samples, and by layer what was
+    /// computed ahead of them.
+    pub error_shares: BTreeMap<&'static str, f64>,
     /// The image's error; null where it was not measured.
     pub estimated_error: Option<ErrorEstimate>,
 }

@@ -2,12 +2,16 @@
 //!
 //! Both sides of a surface reflect; the normal is turned to the viewer before a [`Bsdf`] is made.
 
+use crate::albedo::Albedo;
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 use tyndall_math::{Frame, warp};
 
 /// Smallest GGX width used. Smoother surfaces are drawn this smooth: a lobe of 0.06° that the sampler still resolves in f32.
 const MIN_ALPHA: f32 = 1e-3;
+
+/// Chance with which samples of gloss follow the cosine: what Fresnel's factor changes of the diffuse part is spread over all directions.
+const DIFFUSE_IN_GLOSS: f32 = 0.25;
 
 /// Lobes narrower than this width make a surface shiny.
 const SHINY_ALPHA: f32 = 0.3;
@@ -66,7 +70,7 @@ impl Bsdf {
     }
 
     /// Whether what it reflects depends much on direction.
-    pub(crate) fn is_shiny(&self) -> bool {
+    pub fn is_shiny(&self) -> bool {
         self.alpha < SHINY_ALPHA && !self.is_lambert()
     }
 
@@ -78,20 +82,27 @@ impl Bsdf {
         }
     }
 
-    /// About the share of even light that leaves along `w_o`, per colour channel; exact for Lambertian surfaces. What GGX loses to
-    /// masking is not counted.
+    /// The share of even light that leaves along `w_o`, per colour channel; to about 0.003 where surfaces are not Lambertian.
     pub fn albedo(&self, w_o: Vec3) -> Vec3 {
         if self.is_lambert() {
             return self.diffuse;
         }
-        let fresnel = self.fresnel(self.normal.dot(w_o));
-        (Vec3::ONE - fresnel) * self.diffuse + fresnel
+        let [at_0, at_90] = Albedo::of(self.normal.dot(w_o), self.alpha).lobe;
+        self.diffuse_albedo(w_o) + self.f0 * at_0 + self.f90 * at_90
+    }
+
+    /// The part of [`Bsdf::albedo`] that the Lambertian base has; what is left is gloss, see [`Bsdf::sample_gloss`].
+    pub fn diffuse_albedo(&self, w_o: Vec3) -> Vec3 {
+        if self.is_lambert() {
+            return self.diffuse;
+        }
+        let taken = Albedo::of(self.normal.dot(w_o), self.alpha).base;
+        let fresnel = self.f0 + (Vec3::splat(self.f90) - self.f0) * taken;
+        (Vec3::ONE - fresnel) * self.diffuse
     }
 
     fn fresnel(&self, cos: f32) -> Vec3 {
-        let m = (1.0 - cos).clamp(0.0, 1.0);
-        let m2 = m * m;
-        self.f0 + (Vec3::splat(self.f90) - self.f0) * (m2 * m2 * m)
+        self.f0 + (Vec3::splat(self.f90) - self.f0) * schlick(cos)
     }
 
     /// Probability of following the diffuse part.
@@ -121,11 +132,15 @@ impl Bsdf {
 
     /// Density with which [`Bsdf::sample`] picks `w_i`, per steradian.
     pub fn pdf(&self, w_o: Vec3, w_i: Vec3) -> f32 {
+        self.pdf_with(self.diffuse_share(self.normal.dot(w_o)), w_o, w_i)
+    }
+
+    /// As [`Bsdf::pdf`] where directions follow the diffuse part with a chance of `share`.
+    fn pdf_with(&self, share: f32, w_o: Vec3, w_i: Vec3) -> f32 {
         let (cos_o, cos_i) = (self.normal.dot(w_o), self.normal.dot(w_i));
         if cos_o <= 0.0 || cos_i <= 0.0 {
             return 0.0;
         }
-        let share = self.diffuse_share(cos_o);
         let mut pdf = share * cos_i * FRAC_1_PI;
         if share < 1.0 {
             let h = (w_o + w_i).normalize_or_zero();
@@ -138,22 +153,47 @@ impl Bsdf {
 
     /// Samples a direction; `None` where nothing is reflected.
     pub fn sample(&self, w_o: Vec3, lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        let cos_o = self.normal.dot(w_o);
-        if cos_o <= 0.0 {
-            return None;
-        }
-        let frame = Frame::from_normal(self.normal);
-        let w_i = if lobe < self.diffuse_share(cos_o) {
-            frame.to_world(warp::cosine_hemisphere(u))
-        } else {
-            let h = frame.to_world(visible_normal(frame.to_local(w_o), self.alpha, u));
-            h * (2.0 * w_o.dot(h)) - w_o
-        }
-        .normalize_or_zero();
+        let share = self.diffuse_share(self.normal.dot(w_o));
+        let w_i = self.direction(share, w_o, lobe, u)?;
         let pdf = self.pdf(w_o, w_i);
         let value = self.eval(w_o, w_i);
         (pdf > 0.0 && value.max_element() > 0.0).then_some(BsdfSample { w_i, value, pdf })
     }
+
+    /// Samples what is reflected beside [`Bsdf::diffuse_albedo`]; its value may be a little below 0, where Fresnel's factor takes more
+    /// than in the mean. `None` for Lambertian surfaces.
+    pub fn sample_gloss(&self, w_o: Vec3, lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if self.is_lambert() {
+            return None;
+        }
+        let w_i = self.direction(DIFFUSE_IN_GLOSS, w_o, lobe, u)?;
+        let pdf = self.pdf_with(DIFFUSE_IN_GLOSS, w_o, w_i);
+        let even = self.diffuse_albedo(w_o) * (FRAC_1_PI * self.normal.dot(w_i).max(0.0));
+        let value = self.eval(w_o, w_i) - even;
+        (pdf > 0.0).then_some(BsdfSample { w_i, value, pdf })
+    }
+
+    /// A direction that follows the diffuse part with a chance of `share`, else the visible normals.
+    fn direction(&self, share: f32, w_o: Vec3, lobe: f32, u: [f32; 2]) -> Option<Vec3> {
+        if self.normal.dot(w_o) <= 0.0 {
+            return None;
+        }
+        let frame = Frame::from_normal(self.normal);
+        let w_i = if lobe < share {
+            frame.to_world(warp::cosine_hemisphere(u))
+        } else {
+            let h = frame.to_world(visible_normal(frame.to_local(w_o), self.alpha, u));
+            h * (2.0 * w_o.dot(h)) - w_o
+        };
+        Some(w_i.normalize_or_zero())
+    }
+}
+
+/// (1 − cos)⁵ (Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering").
+pub(crate) fn schlick(cos: f32) -> f32 {
+    let m = (1.0 - cos).clamp(0.0, 1.0);
+    let m2 = m * m;
+    m2 * m2 * m
 }
 
 /// GGX distribution of normals D(h), per steradian.
@@ -166,13 +206,13 @@ fn ggx_d(cos_h: f32, alpha: f32) -> f32 {
 }
 
 /// √(α² + (1 − α²) cos²θ), the root in Smith's Λ times cosθ.
-fn smith_root(cos: f32, alpha: f32) -> f32 {
+pub(crate) fn smith_root(cos: f32, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
     (a2 + (1.0 - a2) * cos * cos).sqrt()
 }
 
 /// G / (4 cosθᵢ cosθₒ) with the height-correlated Smith term.
-fn smith_v(cos_o: f32, cos_i: f32, alpha: f32) -> f32 {
+pub(crate) fn smith_v(cos_o: f32, cos_i: f32, alpha: f32) -> f32 {
     0.5 / (cos_i * smith_root(cos_o, alpha) + cos_o * smith_root(cos_i, alpha))
         .max(f32::MIN_POSITIVE)
 }
@@ -180,7 +220,7 @@ fn smith_v(cos_o: f32, cos_i: f32, alpha: f32) -> f32 {
 /// Samples the GGX normals visible from local direction `w_o`.
 ///
 /// Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps", listing 3.
-fn visible_normal(w_o: Vec3, alpha: f32, u: [f32; 2]) -> Vec3 {
+pub(crate) fn visible_normal(w_o: Vec3, alpha: f32, u: [f32; 2]) -> Vec3 {
     let std = Vec3::new(w_o.x * alpha, w_o.y * alpha, w_o.z).normalize();
     let phi = 2.0 * PI * u[0];
     let z = (1.0 - u[1]) * (1.0 + std.z) - std.z;
@@ -264,6 +304,31 @@ mod tests {
             assert!(
                 (integral - above).abs() < 0.02,
                 "{bsdf:?}: {integral} against {above}"
+            );
+        }
+    }
+
+    #[test]
+    fn gloss_and_the_diffuse_part_are_all_that_is_reflected() {
+        for bsdf in bsdfs() {
+            let w_o = Vec3::new(0.6, 0.0, 0.8);
+            let n = 20_000;
+            // Even light, so that the diffuse part is known; standard errors are below 0.5 %.
+            let mean = |sample: &dyn Fn(&mut Sampler) -> Option<BsdfSample>| {
+                let found = samples(n).filter_map(|mut s| sample(&mut s));
+                found.map(|s| s.value / s.pdf).sum::<Vec3>() / n as f32
+            };
+            let all = mean(&|s| bsdf.sample(w_o, s.next_1d(), s.next_2d()));
+            let gloss = mean(&|s| bsdf.sample_gloss(w_o, s.next_1d(), s.next_2d()));
+            let sum = gloss + bsdf.diffuse_albedo(w_o);
+            assert!(
+                (all - sum).abs().max_element() < 0.015,
+                "{bsdf:?}: {all} {sum}"
+            );
+            let albedo = bsdf.albedo(w_o);
+            assert!(
+                (all - albedo).abs().max_element() < 0.015,
+                "{bsdf:?}: {all} {albedo}"
             );
         }
     }

@@ -458,10 +458,34 @@ pub fn one_of<G: Geometry, L: Lights>(
     visitor.value * direction.weight
 }
 
+/// Light that arrives along `ray` at its origin by one path; straight from skies if `sky`, and from no other emitter.
+pub fn along<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    ray: Ray,
+    sky: bool,
+    reach: Reach<'_>,
+    sampler: &mut Sampler,
+) -> Vec3 {
+    let start = Start {
+        ray,
+        hit: None,
+        first: FirstEvent::Any,
+        reach: reach.behind_one(),
+    };
+    let mut visitor = ScatteredLight {
+        sky,
+        ..ScatteredLight::default()
+    };
+    trace(world, &start, sampler, &mut visitor);
+    visitor.value
+}
+
 /// Sums what a path finds, but for light straight from emitters.
 #[derive(Default)]
 struct ScatteredLight {
     scattered: bool,
+    /// Whether light straight from skies counts.
+    sky: bool,
     value: Vec3,
 }
 
@@ -470,8 +494,9 @@ impl Visitor for ScatteredLight {
         self.scattered = true;
     }
 
-    fn light(&mut self, value: Vec3, last: Option<Vertex<'_, '_>>, _source: Source) {
-        if self.scattered || last.is_some() {
+    fn light(&mut self, value: Vec3, last: Option<Vertex<'_, '_>>, source: Source) {
+        let from_sky = self.sky && matches!(source, Source::Far(_));
+        if self.scattered || last.is_some() || from_sky {
             self.value += value;
         }
     }

@@ -75,6 +75,7 @@
 //! A path draws its numbers from a [`Sampler`](tyndall_math::Sampler), that is from a key; nothing else is random. Nothing here
 //! starts a thread, keeps state, or prints.
 
+mod albedo;
 pub mod batches;
 pub mod bsdf;
 pub mod direct;

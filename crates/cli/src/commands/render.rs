@@ -134,6 +134,8 @@ fn load_options(args: &RenderArgs) -> LoadOptions {
 fn render_options(args: &RenderArgs) -> RenderOptions {
     RenderOptions {
         integrator: args.integrator.0,
+        multiple: args.multiple.into(),
+        single: args.single.into(),
         error: args.error,
         spp: args.spp,
         width: args.width,

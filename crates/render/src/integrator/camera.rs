@@ -35,6 +35,7 @@ const MAKESHIFT: f32 = 0.05;
 const FOG_PART: u64 = 1;
 const PATHS_PART: u64 = 2;
 const SKY_PART: u64 = 3;
+const GLOSS_PART: u64 = 4;
 
 /// Scattering events that light of the `multiple` layer has had at least: media's own emission needs only the last.
 pub(crate) fn least_multiple_depth(scene: &Scene) -> u32 {
@@ -236,8 +237,8 @@ impl<'s> Camera<'s> {
     ) -> Vec3 {
         let read = known.indirect.zip(hit).and_then(|(cache, hit)| {
             let normal = hit.bsdf.normal();
-            let lambert = hit.bsdf.is_lambert();
-            let indirect = lambert.then(|| surfaces::lookup(cache, hit.position, normal))??;
+            let read = surfaces::holds(&hit).then(|| surfaces::lookup(cache, hit.position, normal));
+            let indirect = read??;
             Some((hit, indirect))
         });
         let Some((hit, indirect)) = read else {
@@ -253,7 +254,33 @@ impl<'s> Camera<'s> {
         let u = sampler.next_2d();
         let direct = lights(world, hit.position, Some(&hit), choice, u)
             .map_or(Vec3::ZERO, |s| hit.bsdf.eval(w_o, s.w_i) * s.radiance);
-        flight.transmittance() * (hit.emission + direct + hit.bsdf.albedo(w_o) * indirect)
+        let even = hit.bsdf.diffuse_albedo(w_o) * indirect;
+        let mut reflected = direct + even;
+        if !hit.bsdf.is_lambert() {
+            let path = &mut sampler.branch(GLOSS_PART);
+            reflected += self.gloss(world, &hit, w_o, known.sky.is_some(), path);
+        }
+        flight.transmittance() * (hit.emission + reflected)
+    }
+
+    /// What the surface at `hit` reflects of the light that records hold beside its diffuse part, by one path; `sky` tells whether that
+    /// of skies is held.
+    fn gloss(
+        &self,
+        world: &World<'_, Counted<'_>, LightSet>,
+        hit: &SurfaceHit,
+        w_o: Vec3,
+        sky: bool,
+        sampler: &mut Sampler,
+    ) -> Vec3 {
+        let lobe = sampler.next_1d();
+        let sample = hit.bsdf.sample_gloss(w_o, lobe, sampler.next_2d());
+        sample
+            .filter(|s| s.w_i.dot(hit.normal) > 0.0)
+            .map_or(Vec3::ZERO, |s| {
+                let path = &mut sampler.branch(GLOSS_PART);
+                s.value / s.pdf * gather::along(world, hit.spawn(s.w_i), sky, self.reach, path)
+            })
     }
 
     fn traced(

@@ -7,7 +7,9 @@ mod counted;
 mod estimate;
 mod field;
 mod fill;
+mod held_out;
 mod pilot;
+mod prepare;
 
 use crate::error::RenderError;
 use crate::film::{Film, FilmRow, Pixel};
@@ -15,14 +17,12 @@ use crate::image::Image;
 use crate::layers::LayerSet;
 use crate::options::{Crop, Depth, Integrator, Phase, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
-use camera::{Camera, Known, Multiple, Tally, least_multiple_depth};
+use camera::{Camera, Known, Tally, least_multiple_depth};
 use estimate::Estimate;
 use field::FilledField;
-use fill::media::{Holds, Media};
-use fill::surfaces::Surfaces;
 use fill::{Fill, Filled, Kind};
 use glam::Vec3;
-use pilot::{Pilot, Plan};
+use prepare::Prepared;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -37,9 +37,11 @@ const FIRST_SAMPLES: u32 = 8;
 const GROWTH: u32 = 4;
 /// Samples per pixel at which a render ends even if its error is not met.
 const MOST_SAMPLES: u32 = 1 << 20;
-/// Share of the target error that noise may take when records are interpolated; the rest is left to interpolation
-/// (added in squares, 0.8² + 0.6² = 1).
-const NOISE_SHARE: f64 = 0.8;
+/// Least and greatest share of the target error that noise may take when records are interpolated; the rest is left to these.
+const NOISE_SHARES: [f64; 2] = [0.6, 0.85];
+
+/// An image errs more than asked where its error is this many times that; what is held out tells errors with some error of its own.
+const TOLERATED: f64 = 1.25;
 
 /// Shares of a time limit after which the filling of the field, that of the caches and the samples end; the rest goes to the estimate
 /// of the error.
@@ -149,64 +151,20 @@ impl<'s> Run<'s> {
         let mut film = Film::new(self.frame, self.crop, layers)?;
 
         let way = self.way(&mut notes);
-        let field = self.has_field(way).then(|| self.field());
-        let reach = Reach {
-            max_depth: self.max_depth,
-            field: field.as_ref().map(|filled| &filled.field),
-        };
-        let plan = self.has_records(way).then(|| self.plan(way, reach));
-        let media = |holds, error| {
-            let seed = self.options.seed;
-            self.fill(Media::new(self.scene, self.frame, holds, seed, error))
-        };
-        let multiple = plan
-            .filter(|_| way == Way::Records)
-            .map(|plan| media(Holds::Multiple(reach), plan.multiple));
-        let sky = plan
-            .filter(|_| self.may_hold_sky())
-            .and_then(|plan| Some(media(Holds::Sky, plan.sky?)));
-        let indirect = plan.filter(|_| self.has_surface_records(way)).map(|plan| {
-            self.fill(Surfaces {
-                scene: self.scene,
-                frame: self.frame,
-                reach,
-                seed: self.options.seed,
-                sky: sky.is_some(),
-                error: plan.surface,
-            })
-        });
-        let cut_short = multiple.as_ref().is_some_and(|filled| filled.cut_short)
-            || sky.as_ref().is_some_and(|filled| filled.cut_short)
-            || indirect.as_ref().is_some_and(|filled| filled.cut_short)
-            || field.as_ref().is_some_and(|filled| filled.cut_short);
-        if let Some(filled) = &field {
-            stats.rays += filled.rays;
-        }
-        for (name, filled) in [("multiple", &multiple), ("single", &sky)] {
-            if let Some(filled) = filled {
-                stats.rays += filled.rays;
-                let count = filled.cache.len() as u64;
-                stats.records.insert(name.to_owned(), count);
-            }
-        }
-        if let Some(filled) = &indirect {
-            stats.rays += filled.rays;
-            let count = filled.cache.len() as u64;
-            stats.records.insert("surface".to_owned(), count);
-        }
+        let prepared = self.prepare(way);
+        let cut_short = prepared.is_cut_short();
+        prepared.count(&mut stats);
         stats.fill_s = self.start.elapsed().as_secs_f64();
 
         let rendering = Instant::now();
-        let known = Known {
-            multiple: match (&multiple, way) {
-                (Some(filled), _) => Multiple::Records(&filled.cache),
-                (None, Way::Paths) => Multiple::Paths,
-                (None, _) => Multiple::None,
-            },
-            sky: sky.as_ref().map(|filled| &filled.cache),
-            indirect: indirect.as_ref().map(|filled| &filled.cache),
-        };
-        let (tally, timed_out) = self.sample(&mut film, &known, reach);
+        let reach = prepared.reach(self.max_depth);
+        let target = self.noise_target(prepared.error());
+        let known = prepared.known(way);
+        let (tally, timed_out) = self.sample(&mut film, target, &known, reach);
+        stats.error_shares.extend(prepared.shares.iter().copied());
+        if let Some(noise) = film.noise() {
+            stats.error_shares.insert("noise", noise.error());
+        }
         stats.spp = film.mean_samples();
         film.fill_gaps();
         stats.render_s = rendering.elapsed().as_secs_f64();
@@ -251,7 +209,8 @@ impl<'s> Run<'s> {
                 stats.spp
             ));
         }
-        if field
+        if prepared
+            .field
             .as_ref()
             .is_some_and(|filled| filled.unsure && !filled.cut_short)
         {
@@ -260,9 +219,12 @@ impl<'s> Run<'s> {
                     .to_owned(),
             );
         }
+        if self.options.spp.is_none() && prepared.error() > TOLERATED * f64::from(self.error) {
+            notes.push(self.short_of_error(&prepared));
+        }
         let count = |kind: &str| grouped(stats.records.get(kind).copied().unwrap_or(0));
         let surface = count("surface");
-        let single = match &sky {
+        let single = match &prepared.sky {
             Some(_) => format!("{} records of skies, else direct", count("single")),
             None => "direct".to_owned(),
         };
@@ -279,12 +241,7 @@ impl<'s> Run<'s> {
         };
         let mut image = film.image();
         if let Some(points) = image.channels.get_mut("records") {
-            let media = multiple
-                .iter()
-                .chain(&sky)
-                .flat_map(|filled| &filled.pixels);
-            let surfaces = indirect.iter().flat_map(|filled| &filled.pixels);
-            mark_records(media.chain(surfaces), self.crop, points);
+            mark_records(prepared.pixels(), self.crop, points);
         }
         Ok(Outcome {
             image,
@@ -293,6 +250,18 @@ impl<'s> Run<'s> {
             timed_out: timed_out || cut_short,
             summary: format!("{}; {found}", self.scene.summary()),
         })
+    }
+
+    /// Says that records err more than the image may, and which of them most.
+    fn short_of_error(&self, prepared: &Prepared) -> String {
+        let worst = (prepared.shares.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
+        let (layer, share) = worst.copied().unwrap_or_default();
+        format!(
+            "the error asked for may not be met: light known ahead of the image is off by {:.1} % of it, most of that ({:.1} %) in the \
+             `{layer}` layer; a smaller --error gives more and better records",
+            100.0 * prepared.error(),
+            100.0 * share
+        )
     }
 
     fn is_lit(&self) -> bool {
@@ -338,33 +307,12 @@ impl<'s> Run<'s> {
         self.has_field(way) && !self.scene.geometry.is_empty()
     }
 
-    fn has_records(&self, way: Way) -> bool {
-        way == Way::Records || self.has_surface_records(way) || self.may_hold_sky()
-    }
-
     /// Whether light straight from skies may be read from records: where surfaces hide most of them, few samples find it.
-    fn may_hold_sky(&self) -> bool {
-        let media = &self.scene.media;
-        self.options.integrator == Integrator::Cache
+    fn may_hold_sky(&self, way: Way) -> bool {
+        way == Way::Records
             && self.max_depth.is_none()
-            && media.is_isotropic()
             && self.scene.lights.has_even_skies()
             && !self.scene.geometry.is_empty()
-    }
-
-    /// How far records may be off.
-    fn plan(&self, way: Way, reach: Reach<'_>) -> Plan {
-        let known = Known {
-            multiple: match (way, reach.field) {
-                (Way::Records, Some(field)) => Multiple::Field(field),
-                (Way::Records | Way::Paths, _) => Multiple::Paths,
-                _ => Multiple::None,
-            },
-            sky: None,
-            indirect: None,
-        };
-        let camera = || Camera::new(self.scene, self.frame, reach);
-        Pilot::new(camera, self.frame, &known, self.options.seed).plan(self.error)
     }
 
     fn field(&self) -> FilledField {
@@ -390,13 +338,26 @@ impl<'s> Run<'s> {
         fill.run(self.progress)
     }
 
-    /// Takes samples in passes until the samples or the error asked for are reached, or the time is up.
-    fn sample(&self, film: &mut Film, known: &Known<'_>, reach: Reach<'_>) -> (Tally, bool) {
+    /// The noise up to which samples are taken, where what was computed before makes an error of `prepared`: errors add in squares.
+    fn noise_target(&self, prepared: f64) -> f64 {
+        let error = f64::from(self.error);
+        if self.options.integrator == Integrator::Path {
+            return error;
+        }
+        let [least, most] = NOISE_SHARES;
+        let left = 1.0 - (prepared / error).powi(2);
+        error * left.max(0.0).sqrt().clamp(least, most)
+    }
+
+    /// Takes samples in passes until the samples asked for or the `target` of noise are reached, or the time is up.
+    fn sample(
+        &self,
+        film: &mut Film,
+        target: f64,
+        known: &Known<'_>,
+        reach: Reach<'_>,
+    ) -> (Tally, bool) {
         let mut tally = Tally::default();
-        let target = match self.options.integrator {
-            Integrator::Path => f64::from(self.error),
-            Integrator::Cache => f64::from(self.error) * NOISE_SHARE,
-        };
         let pixels = (self.crop.width * self.crop.height) as usize;
         let mut goals = vec![self.options.spp.unwrap_or(FIRST_SAMPLES); pixels];
         loop {

@@ -63,6 +63,11 @@ pub(in crate::integrator) struct Media<'s> {
 }
 
 impl<'s> Media<'s> {
+    /// Rays of a record's first attempt.
+    pub(in crate::integrator) fn n_rays(&self) -> usize {
+        self.patterns[0].n_rays()
+    }
+
     /// For a target `error` of what the records hold.
     pub(in crate::integrator) fn new(
         scene: &'s Scene,

@@ -1,6 +1,6 @@
 //! Records of irradiance on surfaces, by indirect light and by even skies.
 //!
-//! They serve Lambertian surfaces; what shines is traced. Radii follow the harmonic mean distance to other surfaces (Ward et al. 1988).
+//! They serve the diffuse part of rough surfaces; gloss, and what shines, is traced. Radii follow the harmonic mean distance to other surfaces (Ward et al. 1988).
 
 use super::{
     Candidate, Counted, Kind, MORE_RAYS, SAME_SURFACE, first_rays, quiet_enough, record,
@@ -39,6 +39,11 @@ pub(in crate::integrator) struct Side {
 /// A cache of indirect irradiance over π.
 pub(in crate::integrator) type SurfaceCache = Cache<3, Side>;
 
+/// Whether records serve the surface.
+pub(in crate::integrator) fn holds(hit: &SurfaceHit) -> bool {
+    !hit.bsdf.is_shiny()
+}
+
 /// Irradiance over π by indirect light at `p` on a surface with the unit `normal` towards the viewer, where records are valid.
 pub(in crate::integrator) fn lookup(cache: &SurfaceCache, p: Vec3, normal: Vec3) -> Option<Vec3> {
     let crowded = Cell::new(false);
@@ -71,10 +76,13 @@ pub(in crate::integrator) struct Surfaces<'s> {
 }
 
 impl Surfaces<'_> {
+    /// Paths of a record's first attempt.
+    pub(in crate::integrator) fn n_rays(&self) -> usize {
+        first_rays(RAYS_GAIN, self.error)
+    }
+
     fn hit<G: Geometry>(geometry: &G, ray: &Ray) -> Option<SurfaceHit> {
-        geometry
-            .intersect(ray, f32::INFINITY)
-            .filter(|hit| hit.bsdf.is_lambert())
+        geometry.intersect(ray, f32::INFINITY).filter(holds)
     }
 }
 
@@ -117,7 +125,7 @@ impl Kind for Surfaces<'_> {
             index: SURFACE | index,
         };
         let g = quiet_enough(self.error, |attempt| {
-            let n_rays = first_rays(RAYS_GAIN, self.error) * MORE_RAYS.pow(attempt as u32);
+            let n_rays = self.n_rays() * MORE_RAYS.pow(attempt as u32);
             irradiance(&world, &hit, n_rays, self.sky, self.reach, key)
         });
         let [least, most] = FOOTPRINTS.map(|n| n * candidate.footprint);

@@ -1,0 +1,131 @@
+//! How far off the light is that was computed before the image, told by light gathered afresh where camera rays ask for it.
+//!
+//! Two independent gathers g1, g2 at a place stand for the truth: (x − g1)(x − g2) has the squared error of what is read there as its
+//! mean. They end in the same coarse field as records do, so what is wrong with that is not seen.
+
+use super::counted::Counted;
+use super::fill::media::{self, MediaCache};
+use super::fill::surfaces::{self, SurfaceCache};
+use super::pilot::Pilot;
+use glam::Vec3;
+use rayon::prelude::*;
+use tyndall_math::{Key, Purpose, Ray, Sampler};
+use tyndall_scene::Scene;
+use tyndall_transport::field::{Field, Part};
+use tyndall_transport::free_flight::FreeFlight;
+use tyndall_transport::gather::{self, GatherPattern};
+use tyndall_transport::irradiance::irradiance;
+use tyndall_transport::path::Reach;
+use tyndall_transport::world::Geometry;
+
+/// One of so many blocks of the pilot is looked at.
+const EVERY: usize = 4;
+/// Places on a camera ray at which light in media is compared: errors of places far apart cancel in a pixel, as they do here.
+const PLACES: usize = 2;
+/// Keeps the numbers of these evaluations from those of the finished image's.
+const HELD_OUT: u64 = 1 << 48;
+
+/// Keys of one block: the place and each gather have one.
+const KEYS: u64 = 1 + 2 * PLACES as u64;
+
+/// What an evaluation is of.
+#[derive(Clone, Copy)]
+pub(super) enum Read<'c> {
+    /// Multiple scattering in the coarse field.
+    Field(&'c Field),
+    /// Multiple scattering in records.
+    Multiple(&'c MediaCache),
+    /// Single scattering of light from skies in records.
+    Sky(&'c MediaCache),
+    /// Light on surfaces in records, with that of skies or without.
+    Surface(&'c SurfaceCache, bool),
+}
+
+/// Evaluations held out from what was computed.
+pub(super) struct HeldOut<'s> {
+    pub(super) scene: &'s Scene,
+    pub(super) frame: [u32; 2],
+    pub(super) seed: u64,
+    pub(super) reach: Reach<'s>,
+    pub(super) pilot: &'s Pilot,
+}
+
+impl HeldOut<'_> {
+    /// What errors of `read` add to the relative error of the image, and the rays it took to know. Each gather takes `n_rays`.
+    pub(super) fn error(&self, read: Read<'_>, n_rays: usize) -> (f64, u64) {
+        let pattern = GatherPattern::new(n_rays);
+        let geometry = Counted::new(self.scene);
+        let blocks: Vec<usize> = (0..self.pilot.len()).step_by(EVERY).collect();
+        let squared: f64 = (blocks.par_iter())
+            .map(|&block| {
+                let found = self.difference(&geometry, read, block, &pattern);
+                let [d1, d2] = found.unwrap_or_default().map(Vec3::as_dvec3);
+                (d1 * d2 * self.pilot.weight(block)).element_sum() / 3.0
+            })
+            .collect::<Vec<f64>>()
+            .iter()
+            .sum();
+        let mean = squared / blocks.len() as f64;
+        (mean.max(0.0).sqrt(), geometry.rays())
+    }
+
+    /// By how much what is read differs from two gathers on a camera ray through `block`; `None` where nothing is read.
+    fn difference(
+        &self,
+        geometry: &Counted<'_>,
+        read: Read<'_>,
+        block: usize,
+        pattern: &GatherPattern,
+    ) -> Option<[Vec3; 2]> {
+        let world = geometry.world(self.scene);
+        let key = |k: u64| Key {
+            seed: self.seed,
+            purpose: Purpose::Validation,
+            index: HELD_OUT + KEYS * block as u64 + k,
+        };
+        let mut sampler = Sampler::new(key(0), 0);
+        let [x, y] = self.pilot.place(block, sampler.next_2d());
+        let [w, h] = self.frame;
+        let ray: Ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
+        let hit = world.geometry.intersect(&ray, f32::INFINITY);
+        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
+        let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+        if let Read::Surface(cache, sky) = read {
+            let hit = hit.filter(surfaces::holds)?;
+            let known = surfaces::lookup(cache, hit.position, hit.bsdf.normal())?;
+            let weight = flight.transmittance() * hit.bsdf.diffuse_albedo(-ray.direction);
+            let fresh = |key| irradiance(&world, &hit, pattern.n_rays(), sky, self.reach, key);
+            return Some([1, 2].map(|k| weight * (known - fresh(key(k)).value)));
+        }
+        if !flight.can_stop() {
+            return None;
+        }
+        let u = sampler.next_1d();
+        let mut difference = [Vec3::ZERO; 2];
+        for place in 0..PLACES {
+            let Some(t) = flight.sample_inside((place as f32 + u) / PLACES as f32) else {
+                continue;
+            };
+            let x = ray.at(t);
+            let known = match read {
+                Read::Field(field) => field.medium(geometry, x, Part::Indirect).map(|l| l.value),
+                Read::Multiple(cache) | Read::Sky(cache) => media::lookup(cache, x),
+                Read::Surface(..) => None,
+            };
+            let Some(known) = known else {
+                continue;
+            };
+            let stop = flight.stop(t);
+            let weight = stop.transmittance * world.media.at(x).sigma_s / flight.pdf_inside(&stop);
+            for (k, difference) in difference.iter_mut().enumerate() {
+                let key = key(1 + (2 * place + k) as u64);
+                let fresh = match read {
+                    Read::Sky(_) => gather::sky(&world, x, pattern, key),
+                    _ => gather::multiple(&world, x, pattern, self.reach, key),
+                };
+                *difference += weight * (known - fresh.value) / PLACES as f32;
+            }
+        }
+        Some(difference)
+    }
+}

@@ -1,0 +1,199 @@
+//! What is computed before the image: the coarse field, records, and how far off they are.
+//!
+//! A pilot tells how well each part of the light must be known; evaluations held out tell how well it is.
+
+use super::camera::{Camera, Known, Multiple};
+use super::field::FilledField;
+use super::fill::Filled;
+use super::fill::media::{Holds, Media};
+use super::fill::surfaces::{Side, Surfaces};
+use super::held_out::{HeldOut, Read};
+use super::pilot::{Pilot, Plan};
+use super::{Run, Way};
+use crate::options::MultipleFrom;
+use crate::stats::Stats;
+use tyndall_transport::path::Reach;
+use tyndall_transport::walls::Walls;
+
+/// What was computed, where it is of use.
+#[derive(Default)]
+pub(super) struct Prepared {
+    pub(super) field: Option<FilledField>,
+    /// Whether camera rays read multiple scattering from the field itself.
+    pub(super) reads_field: bool,
+    pub(super) multiple: Option<Filled<Walls>>,
+    /// Single scattering of light from skies.
+    pub(super) sky: Option<Filled<Walls>>,
+    pub(super) surface: Option<Filled<Side>>,
+    /// What each part of it adds to the relative error of the image, by layer.
+    pub(super) shares: Vec<(&'static str, f64)>,
+    /// Rays of the pilot and of the evaluations.
+    rays: u64,
+}
+
+impl Prepared {
+    pub(super) fn reach(&self, max_depth: Option<u32>) -> Reach<'_> {
+        Reach {
+            max_depth,
+            field: self.field.as_ref().map(|filled| &filled.field),
+        }
+    }
+
+    /// What camera samples read.
+    pub(super) fn known(&self, way: Way) -> Known<'_> {
+        let field = self.field.as_ref().map(|filled| &filled.field);
+        Known {
+            multiple: match (&self.multiple, way) {
+                (Some(filled), _) => Multiple::Records(&filled.cache),
+                (None, Way::Paths) => Multiple::Paths,
+                (None, _) => field
+                    .filter(|_| self.reads_field)
+                    .map_or(Multiple::None, Multiple::Field),
+            },
+            sky: self.sky.as_ref().map(|filled| &filled.cache),
+            indirect: self.surface.as_ref().map(|filled| &filled.cache),
+        }
+    }
+
+    /// Whether the time limit ended any of it.
+    pub(super) fn is_cut_short(&self) -> bool {
+        let media = [&self.multiple, &self.sky].into_iter().flatten();
+        media.into_iter().any(|filled| filled.cut_short)
+            || self.surface.as_ref().is_some_and(|filled| filled.cut_short)
+            || self.field.as_ref().is_some_and(|filled| filled.cut_short)
+    }
+
+    /// The relative error that all of it makes together.
+    pub(super) fn error(&self) -> f64 {
+        let squared = self.shares.iter().map(|(_, share)| share * share);
+        squared.sum::<f64>().sqrt()
+    }
+
+    /// Pixels through which records were asked for.
+    pub(super) fn pixels(&self) -> impl Iterator<Item = &[u32; 2]> {
+        let media = self.multiple.iter().chain(&self.sky);
+        let surface = self.surface.iter().flat_map(|filled| &filled.pixels);
+        media.flat_map(|filled| &filled.pixels).chain(surface)
+    }
+
+    /// Tells `stats` what it cost.
+    pub(super) fn count(&self, stats: &mut Stats) {
+        let field = self.field.as_ref().map_or(0, |filled| filled.rays);
+        stats.rays += field + self.rays;
+        let mut add = |kind: &str, rays: u64, records: usize| {
+            stats.rays += rays;
+            stats.records.insert(kind.to_owned(), records as u64);
+        };
+        for (kind, filled) in [("multiple", &self.multiple), ("single", &self.sky)] {
+            if let Some(filled) = filled {
+                add(kind, filled.rays, filled.cache.len());
+            }
+        }
+        if let Some(filled) = &self.surface {
+            add("surface", filled.rays, filled.cache.len());
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Computes what samples on this `way` will read.
+    pub(super) fn prepare(&self, way: Way) -> Prepared {
+        let mut prepared = Prepared {
+            field: self.has_field(way).then(|| self.field()),
+            ..Prepared::default()
+        };
+        let holds_surfaces = self.has_surface_records(way);
+        let may_hold_sky = self.may_hold_sky(way);
+        if way != Way::Records && !holds_surfaces && !may_hold_sky {
+            return prepared;
+        }
+        let seed = self.options.seed;
+        let field = prepared.field.take();
+        let reach = Reach {
+            max_depth: self.max_depth,
+            field: field.as_ref().map(|filled| &filled.field),
+        };
+        let pilot = self.pilot(way, reach);
+        let plan = pilot.plan(self.error);
+        let held_out = HeldOut {
+            scene: self.scene,
+            frame: self.frame,
+            seed,
+            reach,
+            pilot: &pilot,
+        };
+        let mut rays = pilot.rays;
+        let mut check = |read: Read<'_>, n_rays: usize| {
+            let (error, more) = held_out.error(read, n_rays);
+            rays += more;
+            error
+        };
+        let mut shares = Vec::new();
+        if way == Way::Records {
+            let kind = self.media(Holds::Multiple(reach), plan.multiple);
+            let in_field = reach
+                .field
+                .filter(|_| self.options.multiple != MultipleFrom::Records);
+            let field_error = in_field.map(|field| check(Read::Field(field), kind.n_rays()));
+            let allowed = f64::from(Plan::SCATTERED * self.error);
+            prepared.reads_field = self.options.multiple == MultipleFrom::Field
+                && in_field.is_some()
+                || field_error.is_some_and(|error| error <= allowed);
+            let error = if prepared.reads_field {
+                field_error.unwrap_or(0.0)
+            } else {
+                let n_rays = kind.n_rays();
+                let filled = self.fill(kind);
+                let error = check(Read::Multiple(&filled.cache), n_rays);
+                prepared.multiple = Some(filled);
+                error
+            };
+            shares.push(("multiple", error));
+        }
+        if let Some(error) = plan.sky(self.options.single).filter(|_| may_hold_sky) {
+            let kind = self.media(Holds::Sky, error);
+            let n_rays = kind.n_rays();
+            let filled = self.fill(kind);
+            shares.push(("single", check(Read::Sky(&filled.cache), n_rays)));
+            prepared.sky = Some(filled);
+        }
+        if holds_surfaces {
+            let kind = Surfaces {
+                scene: self.scene,
+                frame: self.frame,
+                reach,
+                seed,
+                sky: prepared.sky.is_some(),
+                error: plan.surface,
+            };
+            let (n_rays, sky) = (kind.n_rays(), kind.sky);
+            let filled = self.fill(kind);
+            let read = Read::Surface(&filled.cache, sky);
+            shares.push(("surface", check(read, n_rays)));
+            prepared.surface = Some(filled);
+        }
+        prepared.shares = shares;
+        prepared.rays = rays;
+        prepared.field = field;
+        prepared
+    }
+
+    fn media<'s>(&'s self, holds: Holds<'s>, error: f32) -> Media<'s> {
+        Media::new(self.scene, self.frame, holds, self.options.seed, error)
+    }
+
+    /// Camera samples that read what light there is from the field, or trace it.
+    fn pilot(&self, way: Way, reach: Reach<'_>) -> Pilot {
+        let known = Known {
+            multiple: match (way, reach.field) {
+                (Way::Records, Some(field)) => Multiple::Field(field),
+                (Way::Records | Way::Paths, _) => Multiple::Paths,
+                _ => Multiple::None,
+            },
+            sky: None,
+            indirect: None,
+        };
+        let camera = || Camera::new(self.scene, self.frame, reach);
+        Pilot::new(camera, self.frame, &known, self.options.seed)
+    }
+}
