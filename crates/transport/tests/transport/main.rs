@@ -12,4 +12,5 @@ mod rig;
 mod samplers;
 mod second_order;
 mod shafts;
+mod sky;
 mod stage;
