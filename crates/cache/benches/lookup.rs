@@ -1,15 +1,15 @@
-//! Time of a lookup, of a whole march and of building the index, at 10⁴ and 10⁶ records.
+//! Time of 512 lookups, of a march over as many points and of building the index, at 10⁴ and 10⁶ records.
 #![allow(missing_docs, reason = "criterion's macros make public functions")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use std::hint::black_box;
-use tyndall_cache::{Cache, Record};
+use tyndall_cache::{Cache, Record, Segment};
 
 /// Records valid at a point, on the average.
 const OVERLAP: f32 = 8.0;
 
-/// Points on one march through the cube; neighbouring ones are about a thirtieth of a radius apart at 10⁴ records.
+/// Points on one march.
 const STEPS: usize = 512;
 
 /// Uniform numbers in [0, 1): `SplitMix64` (Steele et al. 2014).
@@ -44,11 +44,19 @@ fn records(n: usize) -> Vec<Record<3>> {
     (0..n).map(record).collect()
 }
 
-/// Points along a slanted ray through the middle of the cube.
-fn march() -> Vec<Vec3> {
-    let (start, end) = (Vec3::new(0.1, 0.3, 0.2), Vec3::new(0.9, 0.8, 0.6));
-    let point = |i| start.lerp(end, (i as f32 + 0.5) / STEPS as f32);
-    (0..STEPS).map(point).collect()
+/// A slanted way into the middle of the cube past about a hundred records, however many there are: 27 steps are a mean radius.
+fn segment(n: usize) -> Segment {
+    Segment {
+        origin: Vec3::new(0.1, 0.3, 0.2),
+        direction: Vec3::new(0.8, 0.5, 0.4) * (1e4 / n as f32).cbrt(),
+        range: [0.0, 1.0],
+    }
+}
+
+fn steps() -> Vec<f32> {
+    (0..STEPS)
+        .map(|i| (i as f32 + 0.5) / STEPS as f32)
+        .collect()
 }
 
 fn scattered() -> Vec<Vec3> {
@@ -64,7 +72,9 @@ fn lookups(c: &mut Criterion) {
         if let Err(error) = cache.insert(records(n)) {
             panic!("the benchmark's records are valid: {error}");
         }
-        for (name, points) in [("coherent", march()), ("scattered", scattered())] {
+        let (segment, ts) = (segment(n), steps());
+        let coherent: Vec<Vec3> = ts.iter().map(|&t| segment.at(t)).collect();
+        for (name, points) in [("coherent", coherent.clone()), ("scattered", scattered())] {
             group.bench_with_input(BenchmarkId::new(name, n), &points, |b, points| {
                 b.iter(|| {
                     for &p in points {
@@ -73,7 +83,14 @@ fn lookups(c: &mut Criterion) {
                 });
             });
         }
-        group.bench_with_input(BenchmarkId::new("covers", n), &march(), |b, points| {
+        let crossings = cache.crossings(&segment);
+        group.bench_function(BenchmarkId::new("march", n), |b| {
+            b.iter(|| crossings.march(&ts, |_, _, _| true, |_, value| _ = black_box(value)));
+        });
+        group.bench_function(BenchmarkId::new("crossings", n), |b| {
+            b.iter(|| cache.crossings(black_box(&segment)));
+        });
+        group.bench_with_input(BenchmarkId::new("covers", n), &coherent, |b, points| {
             b.iter(|| points.iter().filter(|&&p| cache.covers(p)).count());
         });
     }

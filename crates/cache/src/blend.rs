@@ -1,16 +1,13 @@
 //! How records become one value: a weighted mean of their logarithms, extrapolated along their gradients.
-//! Logarithms and scaled gradients are kept ready per record, so that a lookup costs one `exp` a channel and no `ln`.
+//! Channels lie side by side in groups of four: a lookup costs one `exp` a channel and no `ln`.
 
-use crate::record::Record;
-use glam::Vec3;
+use crate::shape::{Shape, WIDTH};
+use glam::{Vec3, Vec4};
 use std::f32::consts::LN_2;
 
 /// Each half of a record's extrapolation, by its own gradient and by the blended one, changes the logarithm by at most this much:
 /// a factor of 4 in all, as far as a log-linear field is believed.
-const MAX_EXTRAPOLATION: f32 = 0.7;
-
-/// Bound on |∇ln L|·R; far above [`MAX_EXTRAPOLATION`] and far below overflow.
-const MAX_SLOPE: f64 = 1e6;
+pub(crate) const MAX_EXTRAPOLATION: f32 = 0.7;
 
 /// Weight of a record at the distance (1 − s)·R, 0 < s ≤ 1.
 ///
@@ -20,46 +17,14 @@ pub(crate) fn weight(s: f32) -> f32 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// What a record adds to a blend; 64 bytes, a line of the processor's cache, for three channels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape<const N: usize> {
-    /// ln L per channel, −∞ where L = 0.
-    pub(crate) ln_value: [f32; N],
-    /// R ∇ln L per channel, 0 where L = 0.
-    pub(crate) slope: [Vec3; N],
-    /// How far noise lowers the mean of ln L per channel: ½v/(1 + 1.5v) with v = Var L/L². 0 where L = 0.
-    ///
-    /// For a true value of 1 and normal noise of variance s², E ln L = −s²/2 − 3s⁴/4 + …, and as v divides by the noisy value
-    /// E v = s² + 3s⁴ + …: of the two second-order terms −1.5 · ½v² is left. Never above ⅓.
-    pub(crate) lowered: [f32; N],
-    pub(crate) radius: f32,
+/// [`weight`] at four points, from their squared distances as shares of R².
+#[inline]
+pub(crate) fn weights(squared: Vec4) -> Vec4 {
+    let s = 1.0 - sqrt(squared);
+    s * s * (3.0 - 2.0 * s)
 }
 
-impl<const N: usize> Shape<N> {
-    pub(crate) fn new(record: &Record<N>) -> Self {
-        let relative = |channel: usize, x: f64| match f64::from(record.value[channel]) {
-            0.0 => 0.0,
-            value => x / value,
-        };
-        Self {
-            ln_value: record.value.map(f32::ln),
-            // In f64: the quotient of f32 numbers may overflow.
-            slope: std::array::from_fn(|channel| {
-                let gradient = record.gradient[channel].as_dvec3() * f64::from(record.radius);
-                let slope = gradient * relative(channel, 1.0);
-                slope.clamp_length_max(MAX_SLOPE).as_vec3()
-            }),
-            lowered: std::array::from_fn(|channel| {
-                let variance = f64::from(record.variance[channel]);
-                let relative = relative(channel, relative(channel, variance));
-                (0.5 * relative / (1.0 + 1.5 * relative)) as f32
-            }),
-            radius: record.radius,
-        }
-    }
-}
-
-/// The running sums of one lookup.
+/// The running sums of a lookup, for a group of channels.
 ///
 /// With weights normalised to Σ w = 1, offsets dₖ = p − xₖ and gradients gₖ = ∇ln Lₖ, per channel:
 ///
@@ -77,141 +42,164 @@ impl<const N: usize> Shape<N> {
 /// Jarosz et al. 2008, "Radiance caching for participating media", for the blend in logarithms; the trapezoidal gradient,
 /// the correction for noise, the rules for zeros and the clamps are ours. Exact for constant and exponential fields.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Blend<const N: usize> {
-    /// Σw
-    weight: f32,
-    /// Sums over records with Lₖ > 0.
-    channels: [Sums; N],
-}
-
-#[derive(Clone, Copy, Debug)]
 struct Sums {
+    // Over records with Lₖ > 0:
     /// Σw
-    weight: f32,
+    weight: Vec4,
     /// Σ w (ln Lₖ + ½ gₖ·dₖ + nₖ)
-    ln_value: f32,
-    /// Σ w g
-    gradient: Vec3,
-    /// Σ w d
-    offset: Vec3,
+    ln_value: Vec4,
+    /// Σ w g by axis
+    gradient: [Vec4; 3],
+    /// Σ w d by axis
+    offset: [Vec4; 3],
     /// Σ w² nₖ
-    noise: f32,
-    /// min and max of ln Lₖ, zeros included
-    least: f32,
-    most: f32,
+    noise: Vec4,
+    // Over all records: min and max of ln Lₖ.
+    least: Vec4,
+    most: Vec4,
 }
 
 impl Sums {
     const EMPTY: Self = Self {
-        weight: 0.0,
-        ln_value: 0.0,
-        gradient: Vec3::ZERO,
-        offset: Vec3::ZERO,
-        noise: 0.0,
-        least: f32::INFINITY,
-        most: f32::NEG_INFINITY,
+        weight: Vec4::ZERO,
+        ln_value: Vec4::ZERO,
+        gradient: [Vec4::ZERO; 3],
+        offset: [Vec4::ZERO; 3],
+        noise: Vec4::ZERO,
+        least: Vec4::INFINITY,
+        most: Vec4::NEG_INFINITY,
     };
 
-    /// The channel's value, where all records together weigh `weight`.
+    /// Adds a record with weight `w` and `offset` = (p − x)/R.
     #[inline]
-    fn value(&self, weight: f32) -> f32 {
-        if self.weight == 0.0 {
-            return 0.0;
+    fn add(&mut self, w: f32, shape: &Shape, offset: Vec3) {
+        let ln_value = Vec4::from(shape.ln_value);
+        let lowered = Vec4::from(shape.lowered);
+        let slope = shape.slope.map(Vec4::from);
+        let delta = 0.5 * dot(slope, offset.to_array().map(Vec4::splat));
+        let delta = clamp(delta);
+        // Selections, not branches: which records are zero cannot be foretold.
+        let is_positive = ln_value.cmpgt(Vec4::NEG_INFINITY);
+        let own = Vec4::select(is_positive, Vec4::splat(w), Vec4::ZERO);
+        self.weight += own;
+        self.ln_value += Vec4::select(is_positive, w * (ln_value + delta + lowered), Vec4::ZERO);
+        let inverse_radius = 1.0 / shape.radius;
+        let d = offset * shape.radius;
+        for axis in 0..3 {
+            self.gradient[axis] += own * inverse_radius * slope[axis];
+            self.offset[axis] += own * d[axis];
         }
-        let inverse = 1.0 / self.weight;
-        let carried = 0.5 * (self.gradient * inverse).dot(self.offset * inverse);
+        self.noise += own * own * lowered;
+        self.least = ln_value.min(self.least);
+        self.most = ln_value.max(self.most);
+    }
+
+    /// The blended values, where all records together weigh `weight`; 0 where no record is positive.
+    #[inline]
+    fn value(&self, weight: f32) -> Vec4 {
+        let is_positive = self.weight.cmpgt(Vec4::ZERO);
+        // 1 for lanes whose answer is known to be 0: they need no arithmetic of their own.
+        let own = Vec4::select(is_positive, self.weight, Vec4::ONE);
+        let inverse = 1.0 / own;
+        let mean = |sum: [Vec4; 3]| sum.map(|axis| axis * inverse);
+        let carried = 0.5 * dot(mean(self.gradient), mean(self.offset));
         // The product of extreme gradients and radii may overflow; nothing is known then.
-        let carried = if carried.is_finite() {
-            carried.clamp(-MAX_EXTRAPOLATION, MAX_EXTRAPOLATION)
-        } else {
-            0.0
-        };
+        let carried = clamp(Vec4::select(carried.is_finite_mask(), carried, Vec4::ZERO));
         let ln = self.ln_value * inverse + carried - self.noise * inverse * inverse;
-        let share = self.weight / weight;
+        let share = own / weight;
         // With a zero among the records `least` is −∞, and so is the lower bound.
         let mut ln = ln.max(self.least - LN_2);
         let bound = self.most + LN_2;
-        if ln > bound {
+        let is_above = is_positive & ln.cmpgt(bound);
+        if is_above.any() {
             // share · exp(ln) ≤ 2 max
-            ln = ln.min(bound - share.ln());
+            ln = Vec4::select(is_above, ln.min(bound - share.map(f32::ln)), ln);
         }
-        (share * ln.exp()).min(f32::MAX)
+        let ln = Vec4::select(is_positive, ln, Vec4::ZERO);
+        let value = (share * ln.map(f32::exp)).min(Vec4::splat(f32::MAX));
+        Vec4::select(is_positive, value, Vec4::ZERO)
     }
+}
+
+/// The sums of a lookup at one point: groups of channels side by side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Blend<const N: usize> {
+    /// Σw over all records
+    weight: f32,
+    /// By group; more than there are.
+    groups: [Sums; N],
 }
 
 impl<const N: usize> Blend<N> {
     pub(crate) const EMPTY: Self = Self {
         weight: 0.0,
-        channels: [Sums::EMPTY; N],
+        groups: [Sums::EMPTY; N],
     };
 
-    /// Adds a record with weight `w` and `offset` = (p − x)/R.
+    /// Adds a record, by the groups of its channels, with weight `w` and `offset` = (p − x)/R.
     #[inline]
-    pub(crate) fn add(&mut self, w: f32, shape: &Shape<N>, offset: Vec3) {
+    pub(crate) fn add(&mut self, w: f32, shapes: &[Shape], offset: Vec3) {
         self.weight += w;
-        let d = offset * shape.radius;
-        let inverse_radius = 1.0 / shape.radius;
-        for (channel, sums) in self.channels.iter_mut().enumerate() {
-            let ln_value = shape.ln_value[channel];
-            let slope = shape.slope[channel];
-            let delta = (0.5 * slope.dot(offset)).clamp(-MAX_EXTRAPOLATION, MAX_EXTRAPOLATION);
-            let lowered = shape.lowered[channel];
-            // Selections, not branches: which records are zero cannot be foretold.
-            let is_positive = ln_value > f32::NEG_INFINITY;
-            let own = if is_positive { w } else { 0.0 };
-            sums.weight += own;
-            sums.ln_value += if is_positive {
-                w * (ln_value + delta + lowered)
-            } else {
-                0.0
-            };
-            sums.gradient += (own * inverse_radius) * slope;
-            sums.offset += own * d;
-            sums.noise += own * own * lowered;
-            sums.least = min(ln_value, sums.least);
-            sums.most = max(ln_value, sums.most);
+        for (sums, shape) in self.groups.iter_mut().zip(shapes) {
+            sums.add(w, shape, offset);
         }
     }
 
     /// The blended value; `None` if no record was added.
     #[inline]
     pub(crate) fn value(&self) -> Option<[f32; N]> {
-        (self.weight > 0.0).then(|| self.channels.map(|sums| sums.value(self.weight)))
+        (self.weight > 0.0).then(|| {
+            let mut value = [0.0; N];
+            for (channels, sums) in value.chunks_mut(WIDTH).zip(&self.groups) {
+                let group = sums.value(self.weight).to_array();
+                channels.copy_from_slice(&group[..channels.len()]);
+            }
+            value
+        })
     }
 }
 
-/// Without `f32::min`'s rules for NaN, which cost instructions; nothing here is NaN.
+/// One instruction, once compiled.
 #[inline]
-fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+fn sqrt(x: Vec4) -> Vec4 {
+    Vec4::from(x.to_array().map(f32::sqrt))
 }
 
-/// See [`min`].
+/// To ±0.7.
 #[inline]
-fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+pub(crate) fn clamp(extrapolation: Vec4) -> Vec4 {
+    extrapolation
+        .max(Vec4::splat(-MAX_EXTRAPOLATION))
+        .min(Vec4::splat(MAX_EXTRAPOLATION))
+}
+
+#[inline]
+pub(crate) fn dot(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+    use crate::record::Record;
 
-    fn shape(value: f32, gradient: Vec3) -> Shape<1> {
-        Shape::new(&Record {
+    fn shape(value: f32, gradient: Vec3) -> Shape {
+        let record = Record {
             position: Vec3::ZERO,
             radius: 1.0,
             value: [value],
             gradient: [gradient],
             variance: [0.0],
-        })
+        };
+        Shape::new(&record, 0)
     }
 
     fn blend(parts: &[(f32, f32, f32)]) -> f32 {
-        let mut blend = Blend::EMPTY;
+        let mut blend = Blend::<1>::EMPTY;
         for &(w, value, delta) in parts {
             // All at one place: each is extrapolated by its own and the mean slope alike.
-            blend.add(w, &shape(value, value * delta * Vec3::X), Vec3::X);
+            blend.add(w, &[shape(value, value * delta * Vec3::X)], Vec3::X);
         }
         blend.value().unwrap()[0]
     }
@@ -260,8 +248,6 @@ mod tests {
                     "{value} with {delta}: {found}"
                 );
             }
-            let steep = shape(value, Vec3::new(f32::MAX, -f32::MAX, 1.0));
-            assert!(steep.slope[0].is_finite());
         }
     }
 }

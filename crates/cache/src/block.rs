@@ -2,28 +2,63 @@
 //! Cell lists are made of blocks: a lookup reads the balls of its cell in one piece.
 
 use crate::grid::Ball;
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 /// Balls in a block.
 pub(crate) const WIDTH: usize = 4;
 
 /// Up to four balls, as coordinates of their centres, 1/R and slots.
+///
+/// Arrays, not vectors: choosing a lane of a vector that cannot be foretold is a jump that cannot be foretold.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(16))]
 pub(crate) struct Block {
-    x: Vec4,
-    y: Vec4,
-    z: Vec4,
-    inv_radius: Vec4,
+    x: [f32; WIDTH],
+    y: [f32; WIDTH],
+    z: [f32; WIDTH],
+    inv_radius: [f32; WIDTH],
     slots: [u32; WIDTH],
+}
+
+/// A straight way between two points, measured in units that keep its squares from overflow.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    start: Vec3,
+    unit: f32,
+    inv_unit: f32,
+    /// Way from start to end, in units.
+    way: Vec3,
+    /// way/way²; 0 for a way of 0.
+    inverse: Vec3,
+    margin: f32,
+}
+
+impl Span {
+    pub(crate) fn new([start, end]: [DVec3; 2], unit: f64, margin: f64) -> Self {
+        let way = ((end - start) / unit).as_vec3();
+        let squared = way.length_squared();
+        Self {
+            start: start.as_vec3(),
+            unit: unit as f32,
+            inv_unit: (1.0 / unit) as f32,
+            way,
+            inverse: if squared > 0.0 {
+                way / squared
+            } else {
+                Vec3::ZERO
+            },
+            margin: margin as f32,
+        }
+    }
 }
 
 impl Block {
     /// Four missing balls: 1/R = ∞, so that they hold no point.
     pub(crate) const EMPTY: Self = Self {
-        x: Vec4::ZERO,
-        y: Vec4::ZERO,
-        z: Vec4::ZERO,
-        inv_radius: Vec4::INFINITY,
+        x: [0.0; WIDTH],
+        y: [0.0; WIDTH],
+        z: [0.0; WIDTH],
+        inv_radius: [f32::INFINITY; WIDTH],
         slots: [0; WIDTH],
     };
 
@@ -48,10 +83,39 @@ impl Block {
     /// [`Block::offset`] and `Vec3::length_squared`, in their order: both agree to the bit.
     #[inline]
     pub(crate) fn holding(&self, p: Vec3) -> u32 {
-        let x = (Vec4::splat(p.x) - self.x) * self.inv_radius;
-        let y = (Vec4::splat(p.y) - self.y) * self.inv_radius;
-        let z = (Vec4::splat(p.z) - self.z) * self.inv_radius;
+        let inv_radius = Vec4::from(self.inv_radius);
+        let x = (p.x - Vec4::from(self.x)) * inv_radius;
+        let y = (p.y - Vec4::from(self.y)) * inv_radius;
+        let z = (p.z - Vec4::from(self.z)) * inv_radius;
         (x * x + y * y + z * z).cmplt(Vec4::ONE).bitmask()
+    }
+
+    /// Bit `lane` tells whether that ball may come within a margin of a span.
+    #[inline]
+    pub(crate) fn near(&self, span: &Span) -> u32 {
+        let inv_radius = Vec4::from(self.inv_radius);
+        let x = (span.start.x - Vec4::from(self.x)) * span.inv_unit;
+        let y = (span.start.y - Vec4::from(self.y)) * span.inv_unit;
+        let z = (span.start.z - Vec4::from(self.z)) * span.inv_unit;
+        let nearest = -(x * span.inverse.x + y * span.inverse.y + z * span.inverse.z);
+        let nearest = nearest.max(Vec4::ZERO).min(Vec4::ONE);
+        let x = x + nearest * span.way.x;
+        let y = y + nearest * span.way.y;
+        let z = z + nearest * span.way.z;
+        let squared = inv_radius * span.unit;
+        let squared = (x * x + y * y + z * z) * (squared * squared);
+        let reach = 1.0 + inv_radius * span.margin;
+        // Where a product overflows nothing is known, and the ball stays in.
+        let is_far = squared.cmpgt(reach * reach);
+        (!is_far & inv_radius.cmplt(Vec4::INFINITY)).bitmask()
+    }
+
+    /// The ball in a lane.
+    pub(crate) fn ball(&self, lane: usize) -> Ball {
+        Ball {
+            centre: Vec3::new(self.x[lane], self.y[lane], self.z[lane]),
+            radius: 1.0 / self.inv_radius[lane],
+        }
     }
 
     /// (p − x)/R for one ball.

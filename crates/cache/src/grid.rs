@@ -1,7 +1,7 @@
 //! The geometry of one octree level: a regular grid whose cells have a power of two as their side.
 //! It says which cell a point is in, and which cells a ball of valid radius touches.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A ball in which a record is valid.
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +112,39 @@ impl Grid {
                     if to_xy + to_slab(2, z) <= limit {
                         visit(key([x, y, z]));
                     }
+                }
+            }
+        }
+    }
+
+    /// Calls `visit` with the key of each cell within `margin` of the straight way between two points, and of some beside it.
+    pub(crate) fn for_each_along(
+        &self,
+        [from, to]: [DVec3; 2],
+        margin: f64,
+        mut visit: impl FnMut(u64),
+    ) {
+        let way = to - from;
+        let cells = |axis: usize, a: f64, b: f64| {
+            let coordinate = |a| self.coordinate(a).clamp(0, LAST);
+            let from = from[axis];
+            coordinate(from + a.min(b) - margin)..=coordinate(from + a.max(b) + margin)
+        };
+        // Slab by slab along the axis of the longest way.
+        let main = way.abs().max_position();
+        let [v, w] = [(main + 1) % 3, (main + 2) % 3];
+        for slab in cells(main, 0.0, way[main]) {
+            let face = (slab as f64 - ORIGIN) * self.side - from[main];
+            // Parts of the way at which the slab begins and ends. A way without length is in the slab from start to end.
+            let part = |face: f64| (face / way[main]).clamp(0.0, 1.0);
+            let (a, b) = (part(face - margin), part(face + self.side + margin));
+            let (a, b) = if way[main] == 0.0 { (0.0, 1.0) } else { (a, b) };
+            for row in cells(v, a * way[v], b * way[v]) {
+                for cell in cells(w, a * way[w], b * way[w]) {
+                    let mut coordinates = [slab; 3];
+                    coordinates[v] = row;
+                    coordinates[w] = cell;
+                    visit(key(coordinates));
                 }
             }
         }

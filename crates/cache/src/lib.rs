@@ -6,10 +6,10 @@
 //! Ward et al. 1988 ("A ray tracing solution for diffuse interreflection") with the log-space gradients of Jarosz et al.
 //! 2008 ("Radiance caching for participating media"), over a flat octree.
 //!
-//! Three types are all there is:
+//! Three types to know:
 //! * [`Record`]: the field at one point, in `N` channels;
 //! * [`Cache`]: records in batches in, values out;
-//! * [`CacheError`]: which number of which record was refused.
+//! * [`Crossings`]: all records along a [`Segment`], for the field at many of its points.
 //!
 //! ```
 //! use glam::Vec3;
@@ -41,6 +41,11 @@
 //! [`Cache::clamp_radii`] then warns records of edges that only their neighbours have seen. `examples/scalar_field.rs` does
 //! all of it. Where values are noisy, say how much ([`Record::variance`]): the mean of their logarithms would be too low.
 //!
+//! # Tags
+//! A ball does not always say where a record is valid: walls and edges cut it. Give such records a tag ([`Cache::tagged`],
+//! [`Cache::insert_tagged`]) and ask [`Cache::covers_where`] and [`Cache::lookup_where`] with a function that judges it. The other questions,
+//! [`Cache::coverage`] among them, look at balls alone.
+//!
 //! # Units and signs
 //! Lengths are in your world's unit, the same for positions and radii. Values are 0 or above, in any unit; a gradient is
 //! with respect to moving the point, in units of value per unit of length. Signed quantities have
@@ -53,15 +58,22 @@ mod blend;
 mod block;
 mod cache;
 mod cell_table;
+mod crossings;
 mod error;
+mod exp;
 mod grid;
 mod lipschitz;
+mod march;
 mod octree;
 mod record;
+mod segment;
+mod shape;
 
 pub use cache::Cache;
+pub use crossings::{Crossing, Crossings};
 pub use error::{CacheError, Field};
 pub use record::Record;
+pub use segment::Segment;
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -4,10 +4,11 @@
 //! Ward et al. 1988). A point therefore looks into one cell per occupied level, and that cell's list lies in one piece.
 //! Records are renumbered along the cells they stand in; that number is called a slot.
 
-use crate::block::{Block, WIDTH};
+use crate::block::{Block, Span, WIDTH};
 use crate::cell_table::CellTable;
 use crate::grid::{Ball, CellBox, Grid, SideExponent, key, side_exponent};
-use glam::Vec3;
+use crate::segment::Segment;
+use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// Most records an octree holds: places in lists are `u32`, and 27 cells with a block for each ball are 108 places.
@@ -29,6 +30,29 @@ struct Level {
     grid: Grid,
     slots: Range<usize>,
     cells: CellTable,
+    /// The level's part of all lists.
+    blocks: Range<usize>,
+    /// Corners of the box around the level's balls.
+    bounds: [DVec3; 2],
+}
+
+impl Level {
+    /// Where the list of a cell is.
+    #[inline]
+    fn blocks_of(&self, key: u64) -> Range<usize> {
+        let (start, len) = self.cells.list(key);
+        let first = start as usize / WIDTH;
+        first..first + (len as usize).div_ceil(WIDTH)
+    }
+}
+
+/// Corners of the box around `balls`.
+fn bounds(balls: &[Ball]) -> [DVec3; 2] {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    balls.iter().fold(none, |[low, high], ball| {
+        let (centre, radius) = (ball.centre.as_dvec3(), f64::from(ball.radius));
+        [low.min(centre - radius), high.max(centre + radius)]
+    })
 }
 
 impl Octree {
@@ -76,7 +100,8 @@ impl Octree {
                 }
             });
         }
-        let mut start = self.lists.len() * WIDTH;
+        let first_block = self.lists.len();
+        let mut start = first_block * WIDTH;
         for key in met {
             let end = cells.set_start(key, start as u32);
             start = (end as usize).next_multiple_of(WIDTH);
@@ -89,7 +114,13 @@ impl Octree {
             });
         }
         cells.end_filling();
-        self.levels.push(Level { grid, slots, cells });
+        self.levels.push(Level {
+            grid,
+            slots,
+            cells,
+            blocks: first_block..self.lists.len(),
+            bounds: bounds(balls),
+        });
     }
 
     /// Calls `visit` with the slot and (p − x)/R of each ball that holds `p`, by ascending slots.
@@ -121,13 +152,53 @@ impl Octree {
             .any(|list| list.iter().any(|block| block.holding(p) != 0))
     }
 
+    /// Slots and balls of all balls that may hold a point of the segment, by ascending slots.
+    pub(crate) fn along(&self, segment: &Segment) -> Vec<(usize, Ball)> {
+        let mut found = Vec::new();
+        for level in &self.levels {
+            let [low, high] = level.bounds;
+            let margin = 4.0 * segment.margin(low.abs().max(high.abs()).max_element());
+            let Some(ends) = segment.clip([low - margin, high + margin]) else {
+                continue;
+            };
+            let side = level.grid.side();
+            let span = Span::new(ends, side, margin);
+            let mut search = |blocks: Range<usize>| {
+                for block in blocks {
+                    let mut near = self.lists[block].near(&span);
+                    while near != 0 {
+                        let place = block * WIDTH + near.trailing_zeros() as usize;
+                        near &= near - 1;
+                        let slot = self.lists[block].slot(place % WIDTH);
+                        // One number to sort by: a ball is in several cells.
+                        found.push((slot as u64) << 32 | place as u64);
+                    }
+                }
+            };
+            let n_slabs = (ends[1] - ends[0]).abs().max_element() / side + 2.0;
+            let n_cells = n_slabs * (3.0 + 2.0 * margin / side).powi(2);
+            if n_cells > level.blocks.len() as f64 {
+                search(level.blocks.clone());
+            } else {
+                (level.grid).for_each_along(ends, margin, |key| search(level.blocks_of(key)));
+            }
+        }
+        found.sort_unstable();
+        found.dedup_by_key(|found| *found >> 32);
+        let ball = |found: u64| {
+            let place = found as u32 as usize;
+            let ball = self.lists[place / WIDTH].ball(place % WIDTH);
+            ((found >> 32) as usize, ball)
+        };
+        found.into_iter().map(ball).collect()
+    }
+
     /// Per level the list of balls that may hold `p`.
     #[inline]
     fn lists_at(&self, p: Vec3) -> impl Iterator<Item = &[Block]> {
         self.levels.iter().filter_map(move |level| {
-            let (start, len) = level.cells.list(level.grid.key(p)?);
-            let first = start as usize / WIDTH;
-            Some(&self.lists[first..first + (len as usize).div_ceil(WIDTH)])
+            let blocks = level.blocks_of(level.grid.key(p)?);
+            Some(&self.lists[blocks])
         })
     }
 
