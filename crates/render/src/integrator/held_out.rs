@@ -9,6 +9,7 @@ use super::fill::surfaces::{self, SurfaceCache};
 use super::pilot::Pilot;
 use glam::Vec3;
 use rayon::prelude::*;
+use std::time::Instant;
 use tyndall_math::{Key, Purpose, Ray, Sampler};
 use tyndall_scene::Scene;
 use tyndall_transport::field::{Field, Part};
@@ -25,6 +26,8 @@ const PLACES: usize = 2;
 /// Keeps the numbers of these evaluations from those of the finished image's.
 const HELD_OUT: u64 = 1 << 48;
 
+/// Most rays of a gather.
+const MOST_RAYS: usize = 2048;
 /// Keys of one block: the place and each gather have one.
 const KEYS: u64 = 1 + 2 * PLACES as u64;
 
@@ -48,16 +51,22 @@ pub(super) struct HeldOut<'s> {
     pub(super) seed: u64,
     pub(super) reach: Reach<'s>,
     pub(super) pilot: &'s Pilot,
+    /// When to stop: places not looked at by then count as right.
+    pub(super) deadline: Option<Instant>,
 }
 
 impl HeldOut<'_> {
-    /// What errors of `read` add to the relative error of the image, and the rays it took to know. Each gather takes `n_rays`.
+    /// What errors of `read` add to the relative error of the image, and the rays it took to know. Each gather takes `n_rays`, or
+    /// [`MOST_RAYS`].
     pub(super) fn error(&self, read: Read<'_>, n_rays: usize) -> (f64, u64) {
-        let pattern = GatherPattern::new(n_rays);
+        let pattern = GatherPattern::new(n_rays.min(MOST_RAYS));
         let geometry = Counted::new(self.scene);
         let blocks: Vec<usize> = (0..self.pilot.len()).step_by(EVERY).collect();
         let squared: f64 = (blocks.par_iter())
             .map(|&block| {
+                if self.deadline.is_some_and(|d| Instant::now() >= d) {
+                    return 0.0;
+                }
                 let found = self.difference(&geometry, read, block, &pattern);
                 let [d1, d2] = found.unwrap_or_default().map(Vec3::as_dvec3);
                 (d1 * d2 * self.pilot.weight(block)).element_sum() / 3.0

@@ -7,6 +7,7 @@ use crate::film::Pixel;
 use crate::options::SingleFrom;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::time::Instant;
 use tyndall_math::{Key, Purpose, Sampler};
 
 /// Blocks across and down the frame.
@@ -68,16 +69,20 @@ impl Plan {
 }
 
 impl Pilot {
-    /// Takes samples with what is `known` so far by cameras of one scene.
+    /// Takes samples with what is `known` so far by cameras of one scene; blocks not begun before the `deadline` stay black.
     pub(super) fn new<'s>(
         camera: impl Fn() -> Camera<'s> + Sync,
         frame: [u32; 2],
         known: &Known<'_>,
         seed: u64,
+        deadline: Option<Instant>,
     ) -> Self {
         let found: Vec<(Block, u64)> = (0..BLOCKS[0] * BLOCKS[1])
             .into_par_iter()
             .map(|block| {
+                if deadline.is_some_and(|d| Instant::now() >= d) {
+                    return (Block::default(), 0);
+                }
                 let camera = camera();
                 let mean = mean_of_block(&camera, frame, known, seed, block);
                 (mean, camera.tally().rays)

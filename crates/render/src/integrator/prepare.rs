@@ -9,7 +9,7 @@ use super::fill::media::{Holds, Media};
 use super::fill::surfaces::{Side, Surfaces};
 use super::held_out::{HeldOut, Read};
 use super::pilot::{Pilot, Plan};
-use super::{Run, Way};
+use super::{FILL_DEADLINE, Run, Way};
 use crate::options::MultipleFrom;
 use crate::stats::Stats;
 use tyndall_transport::path::Reach;
@@ -121,6 +121,7 @@ impl Run<'_> {
             seed,
             reach,
             pilot: &pilot,
+            deadline: self.deadline(FILL_DEADLINE),
         };
         let mut rays = pilot.rays;
         let mut check = |read: Read<'_>, n_rays: usize| {
@@ -194,6 +195,7 @@ impl Run<'_> {
             indirect: None,
         };
         let camera = || Camera::new(self.scene, self.frame, reach);
-        Pilot::new(camera, self.frame, &known, self.options.seed)
+        let deadline = self.deadline(FILL_DEADLINE);
+        Pilot::new(camera, self.frame, &known, self.options.seed, deadline)
     }
 }
