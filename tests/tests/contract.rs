@@ -49,6 +49,7 @@ Scene(
 "#;
 
 const INTEGRATORS: [&str; 2] = ["cache", "path"];
+const METHODS: [&str; 2] = ["tyndall", "jarosz08"];
 
 /// Runs `tyndall` in `folder` with arguments separated by spaces; returns its standard error.
 fn succeed(folder: &Path, arguments: &str) -> String {
@@ -203,15 +204,53 @@ fn layers_are_chosen_by_name() {
 }
 
 #[test]
+fn layers_about_records_agree_with_the_statistics() {
+    let folder = TempDir::new().unwrap();
+    for method in METHODS {
+        let options = "--spp 2 --error 0.5 --layers records,radius,lookups --stats stats.json";
+        let layers = render_cornell(folder.path(), &format!("{options} --method {method}"));
+        let [records, radius, lookups] =
+            ["records", "radius", "lookups"].map(|name| &layers.samples[name]);
+        let stats: Value =
+            serde_json::from_slice(&fs::read(folder.path().join("stats.json")).unwrap()).unwrap();
+        let kinds = stats["records"].as_object().unwrap().values();
+        let n_records: u64 = kinds.map(|n| n.as_u64().unwrap()).sum();
+        // Whole numbers, and halves from two samples a pixel: sums are exact.
+        assert_eq!(records.iter().sum::<f32>(), n_records as f32, "{method}");
+        let n_lookups = stats["lookups"].as_u64().unwrap();
+        assert_eq!(
+            2.0 * lookups.iter().sum::<f32>(),
+            n_lookups as f32,
+            "{method}"
+        );
+        assert!(n_lookups > 0 && n_records > 0, "{method}");
+        for (n, radius) in records.iter().zip(radius) {
+            assert_eq!(*n > 0.0, *radius > 0.0, "{method}");
+        }
+    }
+}
+
+#[test]
 fn the_pixels_do_not_depend_on_the_number_of_threads() {
     let folder = TempDir::new().unwrap();
-    for integrator in INTEGRATORS {
+    let choices = ["--integrator path"].map(str::to_owned).into_iter();
+    for choice in choices.chain(METHODS.map(|method| format!("--method {method}"))) {
         let render = |threads| {
-            let options = format!("--spp 2 --integrator {integrator} --threads {threads}");
+            let options = format!("--spp 2 --error 0.2 {choice} --threads {threads}");
             render_cornell(folder.path(), &options).samples
         };
-        assert!(render(1) == render(2), "{integrator}");
+        assert!(render(1) == render(2), "{choice}");
     }
+}
+
+#[test]
+fn a_method_is_only_for_caching() {
+    let folder = TempDir::new().unwrap();
+    let arguments = "render scene.ron --integrator path --method jarosz08";
+    let output = run_tyndall(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("--method"), "{stderr}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
 use tyndall_render::layers::LayerSet;
-use tyndall_render::options::{Crop, Depth, Integrator, MultipleFrom, SingleFrom};
+use tyndall_render::options::{Crop, Depth, Integrator, Method, MultipleFrom, SingleFrom};
 use tyndall_render::probe::Derivatives;
 use tyndall_scene::Fog;
 
@@ -49,6 +49,9 @@ pub(crate) struct RenderArgs {
     /// Where single scattering of light from skies comes from: samples, records, or whichever is cheaper.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) single: SingleArg,
+    /// What kind of records radiance caching uses; tyndall where not given.
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<MethodArg>,
     /// Target error of the image, such as 0.03; samples per pixel and cache tolerance follow from it.
     #[arg(long, value_name = "E", value_parser = value::finite, allow_negative_numbers = true)]
     pub(crate) error: Option<f32>,
@@ -83,7 +86,7 @@ pub(crate) struct RenderArgs {
     pub(crate) time_limit: Option<Duration>,
     #[command(flatten)]
     pub(crate) source: SourceArgs,
-    /// Layers to write: beauty, surface, single, multiple, emission, transmittance, depth, records, samples.
+    /// Layers to write: beauty, surface, single, multiple, emission, transmittance, depth, records, radius, lookups, samples.
     #[arg(long, value_name = "LIST", value_parser = value::layers)]
     pub(crate) layers: Option<LayerSet>,
     /// Start from the records kept in this file.
@@ -202,6 +205,24 @@ impl ValueEnum for IntegratorArg {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.0.name()).help(self.0.about()))
+    }
+}
+
+/// [`Method`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodArg {
+    /// this project's
+    Tyndall,
+    /// as published in 2008: all scattered light from records, made from whole paths; for comparisons, in isotropic media
+    Jarosz08,
+}
+
+impl From<MethodArg> for Method {
+    fn from(arg: MethodArg) -> Self {
+        match arg {
+            MethodArg::Tyndall => Method::Tyndall,
+            MethodArg::Jarosz08 => Method::Jarosz08,
+        }
     }
 }
 
@@ -379,6 +400,10 @@ mod tests {
             (
                 "render s.ron --integrator bdpt",
                 "[possible values: cache, path]",
+            ),
+            (
+                "render s.ron --method ward88",
+                "[possible values: tyndall, jarosz08]",
             ),
             ("render s.ron --max-depth -1", "--max-depth <N|none>"),
             ("render s.ron --layers beauty,albedo", "`albedo`"),

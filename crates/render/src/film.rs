@@ -26,6 +26,8 @@ pub struct Pixel {
     pub transmittance: Vec3,
     /// Distance to the first surface in metres, 0 where there is none.
     pub depth: f32,
+    /// Questions put to caches.
+    pub lookups: f32,
 }
 
 /// Number of sums kept for the even samples' colour, after those of the layers.
@@ -127,7 +129,7 @@ impl Film {
         total as f64 / self.counts.len() as f64
     }
 
-    /// The image so far: means over samples; a pixel without samples is black. The film knows no records: theirs is left at 0. `beauty` is the sum of the layers it is made of, as
+    /// The image so far: means over samples; a pixel without samples is black. The film knows no records: their layers are left at 0. `beauty` is the sum of the layers it is made of, as
     /// the image holds them, so that it equals them to rounding.
     pub fn image(&self) -> Image {
         let mut image = Image {

@@ -44,7 +44,7 @@ pub enum Source {
     Mean(fn(&Pixel) -> Vec3),
     /// The number of samples taken.
     SampleCount,
-    /// The number of cache records asked for through the pixel, counted when the cache was filled.
+    /// The cache records asked for through the pixel, as they were when the cache was filled.
     Records,
 }
 
@@ -107,6 +107,20 @@ pub static LAYERS: &[Layer] = &[
         presence: Presence::Asked,
         about: "cache records asked for through the pixel, number",
         source: Source::Records,
+    },
+    Layer {
+        name: "radius",
+        channels: &["radius"],
+        presence: Presence::Asked,
+        about: "mean radius of the cache records asked for through the pixel, m; 0 where there are none",
+        source: Source::Records,
+    },
+    Layer {
+        name: "lookups",
+        channels: &["lookups"],
+        presence: Presence::Asked,
+        about: "questions put to the caches for a camera sample, mean number",
+        source: Source::Mean(|p| Vec3::splat(p.lookups)),
     },
     Layer {
         name: "samples",

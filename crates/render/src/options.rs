@@ -62,6 +62,16 @@ pub enum SingleFrom {
     Cache,
 }
 
+/// What kind of records radiance caching uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// This project's: gather rays end in a coarse field, gradients and radii know of what stands around, single scattering is sampled.
+    #[default]
+    Tyndall,
+    /// The algorithm as published by Jarosz, Donner, Zwicker and Jensen in 2008: a baseline to compare with.
+    Jarosz08,
+}
+
 /// How often light may scatter, in media or at surfaces, between light and eye.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Depth {
@@ -165,6 +175,8 @@ pub struct RenderOptions {
     pub multiple: MultipleFrom,
     /// Where camera rays find single scattering.
     pub single: SingleFrom,
+    /// What kind of records to use; only with [`Integrator::Cache`].
+    pub method: Option<Method>,
     /// Target error of the image, the square root of its relMSE.
     pub error: Option<f32>,
     /// Samples per pixel, instead of a target error.
@@ -213,6 +225,12 @@ impl RenderOptions {
                 "a finite number above 0, such as 0.03",
             )?;
         }
+        range(
+            "--method",
+            self.method.is_none() || self.integrator == Integrator::Cache,
+            "given".to_owned(),
+            "left out with --integrator path, which has no records",
+        )?;
         if let Some(spp) = self.spp {
             range("--spp", spp > 0, spp.to_string(), "at least 1")?;
         }
@@ -356,6 +374,11 @@ mod tests {
                 ..RenderOptions::default()
             },
             RenderOptions {
+                integrator: Integrator::Path,
+                method: Some(Method::Jarosz08),
+                ..RenderOptions::default()
+            },
+            RenderOptions {
                 threads: Some(0),
                 ..RenderOptions::default()
             },
@@ -372,6 +395,7 @@ mod tests {
             "--error",
             "--error",
             "--spp",
+            "--method",
             "--threads",
             "--width",
             "--height",

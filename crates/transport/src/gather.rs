@@ -37,6 +37,8 @@ pub struct Gathered {
     pub value_error: Vec3,
     /// Standard error of each component of the gradient.
     pub gradient_error: [Vec3; 3],
+    /// Mean over the paths of ‖∇L‖, summed over channels, per metre: gradients that cancel in the sum do not cancel here.
+    pub gradient_norm: f32,
     /// Distance to the nearest surface met by a gather ray, in metres; infinite without surfaces.
     pub nearest: f32,
     /// Harmonic mean of the distances to surfaces, in metres; infinite without surfaces.
@@ -398,6 +400,7 @@ fn gather<'m, G: Geometry, L: Lights>(
         gradient: [dr, dg, db],
         value_error,
         gradient_error: [er, eg, eb],
+        gradient_norm: batches.gradient_norm(),
         nearest,
         harmonic_mean_distance: starts.len() as f32 / inverse,
         walls: Walls::new(starts.iter().filter_map(|(s, _)| s.hit.as_ref()?.as_ref())),
@@ -537,6 +540,7 @@ pub(crate) fn warp_radius<G, L: Lights>(world: &World<'_, G, L>, x: Vec3, neares
 pub(crate) struct Batches {
     sums: [[glam::DVec3; 4]; BATCHES],
     counts: [usize; BATCHES],
+    gradient_norms: f64,
 }
 
 impl Batches {
@@ -546,6 +550,7 @@ impl Batches {
             *sum += term.as_dvec3();
         }
         self.counts[batch] += 1;
+        self.gradient_norms += f64::from(gradient.map(Vec3::length).iter().sum::<f32>());
     }
 
     /// Adds to the mean gradient of a batch that is complete.
@@ -559,6 +564,12 @@ impl Batches {
     pub(crate) fn means(&self) -> [Vec3; 4] {
         let n = self.counts.iter().sum::<usize>().max(1) as f64;
         std::array::from_fn(|k| (self.sums.iter().map(|s| s[k]).sum::<glam::DVec3>() / n).as_vec3())
+    }
+
+    /// Mean norm of the gradients added, summed over channels.
+    pub(crate) fn gradient_norm(&self) -> f32 {
+        let n = self.counts.iter().sum::<usize>().max(1) as f64;
+        (self.gradient_norms / n) as f32
     }
 
     /// Standard errors from the spread of batch means; infinite where fewer than two batches hold samples.

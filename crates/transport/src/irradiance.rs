@@ -73,6 +73,7 @@ pub fn irradiance<G: Geometry, L: Lights>(
     }
     let mut means = scattered.means();
     let mut variances = scattered.errors().map(|error| error * error);
+    let mut gradient_norm = scattered.gradient_norm();
     if sky {
         let mut straight = Batches::default();
         for batch in 0..BATCHES {
@@ -85,6 +86,7 @@ pub fn irradiance<G: Geometry, L: Lights>(
             }
         }
         let (more, errors) = (straight.means(), straight.errors());
+        gradient_norm += straight.gradient_norm();
         means = std::array::from_fn(|i| means[i] + more[i]);
         variances = std::array::from_fn(|i| variances[i] + errors[i] * errors[i]);
     }
@@ -95,6 +97,7 @@ pub fn irradiance<G: Geometry, L: Lights>(
         gradient: [dr, dg, db],
         value_error,
         gradient_error: [er, eg, eb],
+        gradient_norm,
         nearest,
         harmonic_mean_distance: starts.iter().flatten().flatten().count() as f32 / inverse,
         walls: Walls::new(hits()),

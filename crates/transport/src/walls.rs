@@ -49,6 +49,12 @@ pub struct Walls {
 }
 
 impl Walls {
+    /// Nothing bounds what is known.
+    pub const NONE: Self = Self {
+        planes: [Plane::NONE; 2],
+        beyond: f32::INFINITY,
+    };
+
     /// The walls that rays from one point have hit.
     pub(crate) fn new<'h>(hits: impl Iterator<Item = &'h SurfaceHit> + Clone) -> Self {
         let mut planes = [Plane::NONE; 2];

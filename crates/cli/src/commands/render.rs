@@ -136,6 +136,7 @@ fn render_options(args: &RenderArgs) -> RenderOptions {
         integrator: args.integrator.0,
         multiple: args.multiple.into(),
         single: args.single.into(),
+        method: args.method.map(Into::into),
         error: args.error,
         spp: args.spp,
         width: args.width,
@@ -215,6 +216,7 @@ mod tests {
     fn bad_options_and_places_are_found_before_the_scene_is_opened() {
         for line in [
             "none.ron --spp 0",
+            "none.ron --integrator path --method jarosz08",
             "none.ron -o picture.jpg",
             "none.ron -o no-such-folder/x.exr",
             "none.ron -o x.exr --stats no-such-folder/s.json",

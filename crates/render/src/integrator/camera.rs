@@ -36,6 +36,7 @@ const FOG_PART: u64 = 1;
 const PATHS_PART: u64 = 2;
 const SKY_PART: u64 = 3;
 const GLOSS_PART: u64 = 4;
+const SINGLE_PART: u64 = 5;
 
 /// Scattering events that light of the `multiple` layer has had at least: media's own emission needs only the last.
 pub(crate) fn least_multiple_depth(scene: &Scene) -> u32 {
@@ -59,6 +60,8 @@ pub(crate) struct Known<'c> {
     pub(crate) multiple: Multiple<'c>,
     /// Single scattering of light from skies, where records hold it.
     pub(crate) sky: Option<&'c MediaCache>,
+    /// Single scattering of all light, where records hold it.
+    pub(crate) single: Option<&'c MediaCache>,
     /// Light on surfaces, where records hold it: indirect, and where there are records of light from skies that, too.
     pub(crate) indirect: Option<&'c SurfaceCache>,
 }
@@ -147,6 +150,7 @@ impl<'s> Camera<'s> {
             emission: layers.emission,
             transmittance: tyndall_media::transmittance(tau),
             depth: hit.map_or(0.0, |h| h.t),
+            lookups: 0.0,
         }
     }
 
@@ -237,8 +241,11 @@ impl<'s> Camera<'s> {
     ) -> Vec3 {
         let read = known.indirect.zip(hit).and_then(|(cache, hit)| {
             let normal = hit.bsdf.normal();
-            let read = surfaces::holds(&hit).then(|| surfaces::lookup(cache, hit.position, normal));
-            let indirect = read??;
+            if !surfaces::holds(&hit) {
+                return None;
+            }
+            self.lookups.set(self.lookups.get() + 1);
+            let indirect = surfaces::lookup(cache, hit.position, normal)?;
             Some((hit, indirect))
         });
         let Some((hit, indirect)) = read else {
@@ -314,6 +321,15 @@ impl<'s> Camera<'s> {
         known: &Known<'_>,
         sampler: &mut Sampler,
     ) -> Vec3 {
+        if let Some(cache) = known.single {
+            let sampler = &mut sampler.branch(SINGLE_PART);
+            let read = |x, t, sampler: &mut Sampler| {
+                self.read(cache, (x, t), sampler, |sampler| {
+                    from_lights(world, x, sampler)
+                })
+            };
+            return self.scattered(ray, flight, sampler, read);
+        }
         let Some(mut lights) = SegmentLight::new(world, ray, flight) else {
             return Vec3::ZERO;
         };
@@ -388,6 +404,13 @@ impl<'s> Camera<'s> {
             media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| trace(sampler))
         })
     }
+}
+
+/// In-scattered radiance at `x` of light straight from all lights, where media scatter alike in all directions.
+fn from_lights(world: &World<'_, Counted<'_>, LightSet>, x: Vec3, sampler: &mut Sampler) -> Vec3 {
+    let (choice, u) = (sampler.next_1d(), sampler.next_2d());
+    let sample = direct::in_medium(world, x, choice, u);
+    sample.map_or(Vec3::ZERO, |s| s.radiance) * (0.25 * FRAC_1_PI)
 }
 
 /// In-scattered radiance at `x` of light straight from skies, where media scatter alike in all directions.

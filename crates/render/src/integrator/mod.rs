@@ -8,14 +8,16 @@ mod estimate;
 mod field;
 mod fill;
 mod held_out;
+mod jarosz08;
 mod pilot;
 mod prepare;
+mod record_map;
 
 use crate::error::RenderError;
 use crate::film::{Film, FilmRow, Pixel};
 use crate::image::Image;
 use crate::layers::LayerSet;
-use crate::options::{Crop, Depth, Integrator, Phase, Progress, RenderOptions};
+use crate::options::{Crop, Depth, Integrator, Method, Phase, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
 use camera::{Camera, Known, Tally, least_multiple_depth};
 use estimate::Estimate;
@@ -76,6 +78,13 @@ pub fn render(
     options.check()?;
     let frame = options.frame([scene.film.width, scene.film.height]);
     FilmSize::new(frame[0], frame[1])?;
+    if options.method == Some(Method::Jarosz08) && !scene.media.is_isotropic() {
+        return Err(RenderError::NotBuilt {
+            what: "caching of light in anisotropic media as published in 2008 (--method jarosz08)"
+                .to_owned(),
+            instead: "leave the option out".to_owned(),
+        });
+    }
     let crop = options.crop.unwrap_or(Crop::whole(frame)).within(frame)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = options.threads {
@@ -224,15 +233,16 @@ impl<'s> Run<'s> {
         }
         let count = |kind: &str| grouped(stats.records.get(kind).copied().unwrap_or(0));
         let surface = count("surface");
-        let single = match &prepared.sky {
-            Some(_) => format!("{} records of skies, else direct", count("single")),
-            None => "direct".to_owned(),
+        let how_single = match (&prepared.sky, &prepared.single) {
+            (Some(_), _) => format!("{} records of skies, else direct", count("single")),
+            (_, Some(_)) => format!("{} records", count("single")),
+            (None, None) => "direct".to_owned(),
         };
         let found = match way {
             Way::PathIntegrator => "integrator: path".to_owned(),
-            Way::NoMultiple => format!("records: {surface} surface; single: {single}; SH: off"),
+            Way::NoMultiple => format!("records: {surface} surface; single: {how_single}; SH: off"),
             Way::Records => format!(
-                "records: {} multiple, {surface} surface; single: {single}; SH: off",
+                "records: {} multiple, {surface} surface; single: {how_single}; SH: off",
                 count("multiple")
             ),
             Way::Paths => {
@@ -240,9 +250,12 @@ impl<'s> Run<'s> {
             }
         };
         let mut image = film.image();
-        if let Some(points) = image.channels.get_mut("records") {
-            mark_records(prepared.pixels(), self.crop, points);
-        }
+        prepared.show_records(self.crop, &mut image);
+        let found = if self.is_jarosz08() {
+            format!("{found}; method: jarosz08")
+        } else {
+            found
+        };
         Ok(Outcome {
             image,
             stats,
@@ -268,14 +281,18 @@ impl<'s> Run<'s> {
         self.scene.lights.count() > 0 || self.scene.media.emits()
     }
 
+    fn scatters(&self) -> bool {
+        let mut media = self.scene.media.list().iter();
+        media.any(|m| m.sigma_s() != Vec3::ZERO)
+    }
+
     /// The cheapest way that does what this scene needs.
     fn way(&self, notes: &mut Vec<String>) -> Way {
         let media = &self.scene.media;
-        let scatters = media.list().iter().any(|m| m.sigma_s() != Vec3::ZERO);
         if self.options.integrator == Integrator::Path {
             Way::PathIntegrator
         } else if !self.is_lit()
-            || !scatters
+            || !self.scatters()
             || self
                 .max_depth
                 .is_some_and(|max| max < least_multiple_depth(self.scene))
@@ -296,6 +313,7 @@ impl<'s> Run<'s> {
     /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
     fn has_field(&self, way: Way) -> bool {
         way != Way::PathIntegrator
+            && !self.is_jarosz08()
             && self.is_lit()
             && self.max_depth.is_none()
             && self.scene.media.is_isotropic()
@@ -464,10 +482,12 @@ impl<'s> Run<'s> {
                     index: 2 * pixel + u64::from(sample & 1),
                 };
                 let mut sampler = Sampler::new(key, u64::from(sample >> 1));
-                let value = match self.options.integrator {
+                let before = camera.tally().lookups;
+                let mut value = match self.options.integrator {
                     Integrator::Path => camera.path_traced(x, row.y, &mut sampler),
                     Integrator::Cache => camera.cached(x, row.y, &mut sampler, known),
                 };
+                value.lookups = (camera.tally().lookups - before) as f32;
                 match finite(value) {
                     Some(value) => row.add(x, sample, &value),
                     None => {
@@ -512,17 +532,6 @@ fn grouped(n: u64) -> String {
         n.to_string()
     } else {
         format!("{} {:03}", grouped(n / 1000), n % 1000)
-    }
-}
-
-/// Counts the records asked for through each pixel of `crop`.
-fn mark_records<'p>(pixels: impl Iterator<Item = &'p [u32; 2]>, crop: Crop, counts: &mut [f32]) {
-    for &[x, y] in pixels {
-        let inside =
-            x >= crop.x && y >= crop.y && x - crop.x < crop.width && y - crop.y < crop.height;
-        if inside {
-            counts[((y - crop.y) * crop.width + (x - crop.x)) as usize] += 1.0;
-        }
     }
 }
 

@@ -9,8 +9,10 @@ use super::fill::media::{Holds, Media};
 use super::fill::surfaces::{Side, Surfaces};
 use super::held_out::{HeldOut, Read};
 use super::pilot::{Pilot, Plan};
+use super::record_map::RecordMap;
 use super::{FILL_DEADLINE, Run, Way};
-use crate::options::MultipleFrom;
+use crate::image::Image;
+use crate::options::{Crop, MultipleFrom};
 use crate::stats::Stats;
 use tyndall_transport::path::Reach;
 use tyndall_transport::walls::Walls;
@@ -24,11 +26,13 @@ pub(super) struct Prepared {
     pub(super) multiple: Option<Filled<Walls>>,
     /// Single scattering of light from skies.
     pub(super) sky: Option<Filled<Walls>>,
+    /// Single scattering of all light.
+    pub(super) single: Option<Filled<Walls>>,
     pub(super) surface: Option<Filled<Side>>,
     /// What each part of it adds to the relative error of the image, by layer.
     pub(super) shares: Vec<(&'static str, f64)>,
     /// Rays of the pilot and of the evaluations.
-    rays: u64,
+    pub(super) rays: u64,
 }
 
 impl Prepared {
@@ -51,13 +55,16 @@ impl Prepared {
                     .map_or(Multiple::None, Multiple::Field),
             },
             sky: self.sky.as_ref().map(|filled| &filled.cache),
+            single: self.single.as_ref().map(|filled| &filled.cache),
             indirect: self.surface.as_ref().map(|filled| &filled.cache),
         }
     }
 
     /// Whether the time limit ended any of it.
     pub(super) fn is_cut_short(&self) -> bool {
-        let media = [&self.multiple, &self.sky].into_iter().flatten();
+        let media = [&self.multiple, &self.sky, &self.single]
+            .into_iter()
+            .flatten();
         media.into_iter().any(|filled| filled.cut_short)
             || self.surface.as_ref().is_some_and(|filled| filled.cut_short)
             || self.field.as_ref().is_some_and(|filled| filled.cut_short)
@@ -69,11 +76,14 @@ impl Prepared {
         squared.sum::<f64>().sqrt()
     }
 
-    /// Pixels through which records were asked for.
-    pub(super) fn pixels(&self) -> impl Iterator<Item = &[u32; 2]> {
-        let media = self.multiple.iter().chain(&self.sky);
-        let surface = self.surface.iter().flat_map(|filled| &filled.pixels);
-        media.flat_map(|filled| &filled.pixels).chain(surface)
+    /// Shows the records in the layers of `image`, the part `crop` of the frame, that are for that.
+    pub(super) fn show_records(&self, crop: Crop, image: &mut Image) {
+        let mut map = RecordMap::new(crop);
+        for filled in [&self.multiple, &self.sky, &self.single] {
+            map.add(filled.as_ref());
+        }
+        map.add(self.surface.as_ref());
+        map.show(image);
     }
 
     /// Tells `stats` what it cost.
@@ -84,7 +94,8 @@ impl Prepared {
             stats.rays += rays;
             stats.records.insert(kind.to_owned(), records as u64);
         };
-        for (kind, filled) in [("multiple", &self.multiple), ("single", &self.sky)] {
+        let single = self.single.as_ref().or(self.sky.as_ref());
+        for (kind, filled) in [("multiple", self.multiple.as_ref()), ("single", single)] {
             if let Some(filled) = filled {
                 add(kind, filled.rays, filled.cache.len());
             }
@@ -98,6 +109,9 @@ impl Prepared {
 impl Run<'_> {
     /// Computes what samples on this `way` will read.
     pub(super) fn prepare(&self, way: Way) -> Prepared {
+        if self.is_jarosz08() {
+            return self.jarosz08(way);
+        }
         let mut prepared = Prepared {
             field: self.has_field(way).then(|| self.field()),
             ..Prepared::default()
@@ -192,6 +206,7 @@ impl Run<'_> {
                 _ => Multiple::None,
             },
             sky: None,
+            single: None,
             indirect: None,
         };
         let camera = || Camera::new(self.scene, self.frame, reach);

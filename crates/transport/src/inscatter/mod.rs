@@ -56,6 +56,9 @@ pub struct Inscattered {
     pub value_error: Vec3,
     /// Standard error of each component of the gradient.
     pub gradient_error: [Vec3; 3],
+    /// Mean over the samples of ‖∇L‖, summed over channels, per metre, without silhouettes: gradients that cancel in the sum do not
+    /// cancel here.
+    pub gradient_norm: f32,
     /// Standard error of each entry of the Hessian, where there is one.
     pub hessian_error: Option<[DMat3; 3]>,
 }
@@ -78,7 +81,7 @@ pub fn single<G: Geometry, L: Lights>(
     let edges = (order == Order::Hessian).then(|| world.media.edges(x));
     let mut extended = false;
     let spread = in_batches(samples, key, |key, n| {
-        let mut mean = [0.0; NUMBERS];
+        let mut mean = [0.0; NUMBERS + 1];
         let mut draws: Option<Vec<Draw>> = aware.then(Vec::new);
         for i in 0..n {
             let i = i as u64;
@@ -87,6 +90,8 @@ pub fn single<G: Geometry, L: Lights>(
                 edges::add(&point, edges, (key, i), &mut sample);
             }
             add(&mut mean, &sample, order, 1.0 / n as f64);
+            let norms = sample.gradient.map(Vec3::length);
+            mean[NUMBERS] += f64::from(norms.iter().sum::<f32>()) / n as f64;
             extended |= sample.extended;
         }
         if let Some(draws) = draws {
@@ -113,16 +118,17 @@ pub fn single<G: Geometry, L: Lights>(
         hessian: hessian(Welford::mean),
         value_error: vector(0, Welford::standard_error),
         gradient_error: [1, 2, 3].map(|k| vector(k, Welford::standard_error)),
+        gradient_norm: spread[NUMBERS].mean() as f32,
         hessian_error: hessian(Welford::standard_error),
     }
 }
 
-/// Of a sample: value, gradient and Hessian by channel.
+/// Of a sample: value, gradient and Hessian by channel; the norm of its gradient follows them.
 const NUMBERS: usize = 3 + 9 + 27;
 
 /// Adds the numbers of a sample; f64 because thousands of terms of both signs are added.
-fn add(sums: &mut [f64; NUMBERS], sample: &Sample, order: Order, weight: f64) {
-    let (slopes, curvatures) = sums.split_at_mut(12);
+fn add(sums: &mut [f64; NUMBERS + 1], sample: &Sample, order: Order, weight: f64) {
+    let (slopes, curvatures) = sums[..NUMBERS].split_at_mut(12);
     let vectors = [sample.value].into_iter().chain(sample.gradient);
     for (sum, number) in slopes.iter_mut().zip(vectors.flat_map(|v| v.to_array())) {
         *sum += f64::from(number) * weight;

@@ -118,6 +118,42 @@ pub(in crate::integrator) fn nearest(cache: &MediaCache, p: Vec3, reach: f32) ->
     nearest.map(|(_, index)| cache.records()[index].value.into())
 }
 
+/// Visits the points in media on the camera ray through a pixel, where records are wanted; `offset` from 0 to 1 moves them.
+pub(super) fn points_on(
+    scene: &Scene,
+    frame: [u32; 2],
+    (ray, pixel): (&Ray, [u32; 2]),
+    offset: f32,
+    mut visit: impl FnMut(Candidate),
+) {
+    let world = scene.world();
+    let t_max = world
+        .geometry
+        .intersect(ray, f32::INFINITY)
+        .map_or(f32::INFINITY, |h| h.t);
+    let flight = FreeFlight::new(world.media.segment(ray, t_max), Vec3::ONE);
+    if !flight.can_stop() {
+        return;
+    }
+    for i in 0..POINTS_PER_RAY {
+        if let Some(t) = flight.sample_inside((i as f32 + offset) / POINTS_PER_RAY as f32) {
+            visit(Candidate {
+                position: ray.at(t),
+                normal: Vec3::ZERO,
+                footprint: scene.camera.footprint(t, frame[1]),
+                ray: *ray,
+                pixel,
+            });
+        }
+    }
+}
+
+/// Whether a lookup at the point finds a record.
+pub(super) fn covers(cache: &MediaCache, candidate: &Candidate) -> bool {
+    let p = candidate.position;
+    cache.covers_where(p, |walls, _| walls.hold(p))
+}
+
 impl Kind for Media<'_> {
     type Tag = Walls;
 
@@ -125,32 +161,12 @@ impl Kind for Media<'_> {
         RADIUS_RANGE[1] * self.view
     }
 
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, mut visit: impl FnMut(Candidate)) {
-        let world = self.scene.world();
-        let t_max = world
-            .geometry
-            .intersect(ray, f32::INFINITY)
-            .map_or(f32::INFINITY, |h| h.t);
-        let flight = FreeFlight::new(world.media.segment(ray, t_max), Vec3::ONE);
-        if !flight.can_stop() {
-            return;
-        }
-        for i in 0..POINTS_PER_RAY {
-            if let Some(t) = flight.sample_inside((i as f32 + offset) / POINTS_PER_RAY as f32) {
-                visit(Candidate {
-                    position: ray.at(t),
-                    normal: Vec3::ZERO,
-                    footprint: self.scene.camera.footprint(t, self.frame[1]),
-                    ray: *ray,
-                    pixel,
-                });
-            }
-        }
+    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, visit: impl FnMut(Candidate)) {
+        points_on(self.scene, self.frame, (ray, pixel), offset, visit);
     }
 
     fn covers(&self, cache: &MediaCache, candidate: &Candidate) -> bool {
-        let p = candidate.position;
-        cache.covers_where(p, |walls, _| walls.hold(p))
+        covers(cache, candidate)
     }
 
     fn record(
@@ -199,7 +215,8 @@ impl Kind for Media<'_> {
             .max(SMALLEST_FOOTPRINT * candidate.footprint)
             .clamp(least * self.view, most * self.view)
             .min(g.walls.beyond);
-        Some((record(x, radius, &g)?, g.walls))
+        let value = (g.value, g.value_error);
+        Some((record(x, radius, value, g.gradient)?, g.walls))
     }
 }
 

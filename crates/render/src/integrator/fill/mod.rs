@@ -3,6 +3,7 @@
 //! Camera rays on a lattice that grows finer report points no record covers; these are thinned in a fixed order, computed
 //! in parallel and inserted together, so that the records do not depend on the number of threads.
 
+pub(super) mod jarosz08;
 pub(super) mod media;
 pub(super) mod surfaces;
 
@@ -63,16 +64,21 @@ fn relative_slope(g: &Gathered) -> f32 {
     if sum > 0.0 { slope / sum } else { 0.0 }
 }
 
-/// The record at `position` of what was gathered there; `None` where that is not finite.
-fn record(position: Vec3, radius: f32, g: &Gathered) -> Option<Record<3>> {
-    let variance = g.value_error * g.value_error;
+/// The record at `position` of a value, with its standard error, and a gradient found there; `None` where these are not finite.
+fn record(
+    position: Vec3,
+    radius: f32,
+    (value, error): (Vec3, Vec3),
+    gradient: [Vec3; 3],
+) -> Option<Record<3>> {
+    let variance = error * error;
     let finite =
-        g.value.is_finite() && variance.is_finite() && g.gradient.iter().all(|d| d.is_finite());
+        value.is_finite() && variance.is_finite() && gradient.iter().all(|d| d.is_finite());
     finite.then(|| Record {
         position,
         radius: radius.max(f32::MIN_POSITIVE),
-        value: g.value.max(Vec3::ZERO).to_array(),
-        gradient: g.gradient,
+        value: value.max(Vec3::ZERO).to_array(),
+        gradient,
         variance: variance.to_array(),
     })
 }
@@ -81,6 +87,9 @@ fn record(position: Vec3, radius: f32, g: &Gathered) -> Option<Record<3>> {
 pub(super) trait Kind: Sync {
     /// Where a record is valid within its ball.
     type Tag: Clone + Send + Sync;
+
+    /// Neighbouring radii may differ by this much per metre between them; infinite where they stay as they are.
+    const RADIUS_SLOPE: f32 = RADIUS_SLOPE;
 
     /// Largest radius of a record at a point.
     fn most_radius(&self, candidate: &Candidate) -> f32;
@@ -216,9 +225,10 @@ impl<K: Kind> Fill<'_, K> {
             .filter_map(|((record, _), point)| Some((record?, point.pixel)))
             .unzip();
         let cache = &mut filled.cache;
-        let kept = cache
-            .insert_tagged(records)
-            .and_then(|()| cache.clamp_radii(RADIUS_SLOPE));
+        let mut kept = cache.insert_tagged(records);
+        if K::RADIUS_SLOPE.is_finite() {
+            kept = kept.and_then(|()| cache.clamp_radii(K::RADIUS_SLOPE));
+        }
         debug_assert!(kept.is_ok(), "{kept:?}");
         if kept.is_ok() {
             filled.pixels.extend(seen);

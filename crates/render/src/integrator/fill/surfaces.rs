@@ -56,6 +56,15 @@ pub(in crate::integrator) fn lookup(cache: &SurfaceCache, p: Vec3, normal: Vec3)
 }
 
 impl Side {
+    /// On surfaces with about this unit `normal`, whatever walls stand around.
+    pub(super) fn open(normal: Vec3) -> Self {
+        Self {
+            normal,
+            walls: Walls::NONE,
+            crowded: false,
+        }
+    }
+
     fn holds(&self, p: Vec3, normal: Vec3, offset: Vec3) -> bool {
         self.normal.dot(normal) >= SAME_SURFACE
             && self.normal.dot(offset).abs() < THICKNESS
@@ -81,9 +90,32 @@ impl Surfaces<'_> {
         first_rays(RAYS_GAIN, self.error)
     }
 
-    fn hit<G: Geometry>(geometry: &G, ray: &Ray) -> Option<SurfaceHit> {
+    /// What a camera ray meets, where records hold the light on it.
+    pub(super) fn hit<G: Geometry>(geometry: &G, ray: &Ray) -> Option<SurfaceHit> {
         geometry.intersect(ray, f32::INFINITY).filter(holds)
     }
+}
+
+/// The point that the camera ray through a pixel meets, where a record is wanted.
+pub(super) fn point_on(
+    scene: &Scene,
+    frame: [u32; 2],
+    (ray, pixel): (&Ray, [u32; 2]),
+) -> Option<Candidate> {
+    let hit = Surfaces::hit(&scene.geometry, ray)?;
+    Some(Candidate {
+        position: hit.position,
+        normal: hit.bsdf.normal(),
+        footprint: scene.camera.footprint(hit.t, frame[1]),
+        ray: *ray,
+        pixel,
+    })
+}
+
+/// Whether records are valid at the point.
+pub(super) fn covers(cache: &SurfaceCache, candidate: &Candidate) -> bool {
+    let p = candidate.position;
+    cache.covers_where(p, |side, offset| side.holds(p, candidate.normal, offset))
 }
 
 impl Kind for Surfaces<'_> {
@@ -93,21 +125,12 @@ impl Kind for Surfaces<'_> {
         FOOTPRINTS[1] * candidate.footprint
     }
 
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], _: f32, mut visit: impl FnMut(Candidate)) {
-        if let Some(hit) = Self::hit(&self.scene.geometry, ray) {
-            visit(Candidate {
-                position: hit.position,
-                normal: hit.bsdf.normal(),
-                footprint: self.scene.camera.footprint(hit.t, self.frame[1]),
-                ray: *ray,
-                pixel,
-            });
-        }
+    fn points_on(&self, ray: &Ray, pixel: [u32; 2], _: f32, visit: impl FnMut(Candidate)) {
+        point_on(self.scene, self.frame, (ray, pixel)).map(visit);
     }
 
     fn covers(&self, cache: &SurfaceCache, candidate: &Candidate) -> bool {
-        let p = candidate.position;
-        cache.covers_where(p, |side, offset| side.holds(p, candidate.normal, offset))
+        covers(cache, candidate)
     }
 
     fn record(
@@ -140,6 +163,7 @@ impl Kind for Surfaces<'_> {
             walls: g.walls,
             crowded,
         };
-        Some((record(hit.position, radius, &g)?, side))
+        let value = (g.value, g.value_error);
+        Some((record(hit.position, radius, value, g.gradient)?, side))
     }
 }
