@@ -102,11 +102,11 @@ pub fn sample<G: Geometry, L: Lights>(
     towards(world, p, hit, chosen, u)
 }
 
-fn light_choice<G, L: Lights>(
-    world: &World<'_, G, L>,
+fn light_choice<'w, G, L: Lights>(
+    world: &World<'w, G, L>,
     p: Vec3,
     hit: Option<&SurfaceHit>,
-) -> LightChoice {
+) -> LightChoice<'w> {
     let sigma = world.media.at(p).sigma_t.element_sum() / 3.0;
     LightChoice::at(world.lights, p, hit.map(|hit| hit.normal), sigma)
 }

@@ -28,14 +28,14 @@ impl LampDirections {
     pub fn new<L: Lights>(
         lights: &L,
         p: Vec3,
-        choice: &LightChoice,
+        choice: &LightChoice<'_>,
         share: f32,
         sigma: f32,
     ) -> Self {
         let mut lamps = SmallVec::new();
         let mut total = 0.0;
-        for light in 0..lights.count() {
-            let chance = share * choice.pdf(light);
+        for (light, chance) in choice.singles() {
+            let chance = share * chance;
             if chance < LEAST_CHANCE {
                 continue;
             }

@@ -116,20 +116,20 @@ pub struct Start<'f> {
 }
 
 /// How the last vertex could also have found a light, for multiple importance sampling.
-enum Rival {
+enum Rival<'l> {
     /// The path has just started: nothing else looks for lights from here.
     None,
     /// Next-event estimation at a surface.
-    Surface { choice: LightChoice, pdf: f32 },
+    Surface { choice: LightChoice<'l>, pdf: f32 },
     /// Next-event estimation along the segment on which the vertex lies.
     Segment {
-        density: DensityAt,
+        density: DensityAt<'l>,
         /// Density of the path's own way: free flight times phase function.
         pdf: f32,
     },
 }
 
-impl Rival {
+impl Rival<'_> {
     /// Weight of finding `light` in direction `w_i` from `p` by the path's own sampling (power heuristic).
     fn weight<L: Lights>(&self, lights: &L, light: usize, p: Vec3, w_i: Vec3) -> f32 {
         let (own, other) = match self {
@@ -319,7 +319,7 @@ fn seen_surface<G: Geometry, L: Lights>(
     ray: &Ray,
     hit: &SurfaceHit,
     throughput: Vec3,
-    rival: &Rival,
+    rival: &Rival<'_>,
     visitor: &mut impl Visitor,
 ) {
     if hit.emission == Vec3::ZERO {
@@ -339,7 +339,7 @@ fn seen_environment<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     ray: &Ray,
     throughput: Vec3,
-    rival: &Rival,
+    rival: &Rival<'_>,
     visitor: &mut impl Visitor,
 ) {
     for &light in world.lights.environment() {
@@ -400,7 +400,7 @@ fn lit_surface<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     hit: &SurfaceHit,
     w_o: Vec3,
-    (choice, lamps): (&LightChoice, &LampDirections),
+    (choice, lamps): (&LightChoice<'_>, &LampDirections),
     throughput: Vec3,
     (u, w): (f32, [f32; 2]),
     visitor: &mut impl Visitor,

@@ -24,22 +24,22 @@ const CHOICE_DEPTH: f32 = 8.0;
 pub struct SegmentLight<'f, 'm> {
     ray: Ray,
     flight: &'f FreeFlight<'m>,
-    choice: LightChoice,
+    choice: LightChoice<'m>,
     /// Lights that are left out here: shafts bring their light.
     taken: SmallVec<[usize; 4]>,
 }
 
 /// The density with which [`SegmentLight::sample`] would have found lights from one of its distances.
 #[derive(Clone, Debug)]
-pub struct DensityAt {
+pub struct DensityAt<'m> {
     ray: Ray,
     range: (f32, f32),
-    choice: LightChoice,
+    choice: LightChoice<'m>,
     t: f32,
     by_transmittance: f32,
 }
 
-impl DensityAt {
+impl DensityAt<'_> {
     /// Density per metre of picking `light` and this distance.
     pub fn of<L: Lights>(&self, lights: &L, light: usize) -> f32 {
         let chance = self.choice.pdf(light);
@@ -121,15 +121,18 @@ impl<'f, 'm> SegmentLight<'f, 'm> {
         lights: &L,
         probes: u32,
     ) -> SmallVec<[(usize, u32); 4]> {
-        let points = || (0..lights.count()).filter(|&light| !lights.has_extent(light));
-        let all: f32 = points().map(|light| self.choice.pdf(light)).sum();
-        let taken: SmallVec<[(usize, u32); 4]> = points()
-            .filter_map(|light| {
+        let singles = |extended: bool| {
+            let singles = self.choice.singles();
+            singles.filter(move |&(light, _)| lights.has_extent(light) == extended)
+        };
+        // What is judged in clusters counts as lights without extent.
+        let all = 1.0 - singles(true).map(|(_, chance)| chance).sum::<f32>();
+        let taken: SmallVec<[(usize, u32); 4]> = singles(false)
+            .filter_map(|(light, chance)| {
                 let probes = match lights.pivot(light) {
                     Some(_) => 0.5 * probes as f32,
                     None => probes as f32,
                 };
-                let chance = self.choice.pdf(light);
                 (probes * chance >= LEAST_PROBES)
                     .then(|| (light, (probes * chance / all).round() as u32))
             })
@@ -163,7 +166,7 @@ impl<'f, 'm> SegmentLight<'f, 'm> {
     }
 
     /// The density with which lights are found from `stop`.
-    pub fn density_at(self, stop: &Stop) -> DensityAt {
+    pub fn density_at(self, stop: &Stop) -> DensityAt<'m> {
         DensityAt {
             ray: self.ray,
             range: self.flight.segment().range(),

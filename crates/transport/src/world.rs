@@ -3,6 +3,7 @@
 //! `tyndall-scene` implements these traits for files; a test implements them for a box and two lamps in ten lines.
 
 use crate::bsdf::Bsdf;
+use crate::light_tree::LightTree;
 use glam::{DVec3, Vec3};
 use tyndall_math::{Jet, Ray, offset_origin};
 use tyndall_media::Media;
@@ -63,6 +64,11 @@ pub trait Lights: Sync {
     /// them alike; true is safe.
     fn has_extent(&self, _light: usize) -> bool {
         true
+    }
+
+    /// The lights as a tree, where they are too many to look at each; none unless told.
+    fn tree(&self) -> Option<&LightTree> {
+        None
     }
 
     /// Samples a direction from `p` towards `light`.

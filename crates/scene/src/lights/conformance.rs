@@ -1,6 +1,5 @@
 //! One conformance test for every light: what is drawn, what is said of it, and what it adds up to.
 
-use super::importance::mean;
 use super::*;
 use crate::material::Material;
 use crate::mesh::TriangleMesh;
@@ -9,6 +8,7 @@ use glam::Vec2;
 use tyndall_math::stats::{Welford, z_test};
 use tyndall_math::testing::{Directions, FALSE_ALARM_RATE, assert_conforms};
 use tyndall_math::{Key, Purpose, Sampler, warp};
+use tyndall_transport::importance::mean;
 
 /// The point of the benchmarks E2b.
 const P: Vec3 = Vec3::new(0.3, 0.2, 0.1);

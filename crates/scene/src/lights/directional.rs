@@ -1,9 +1,9 @@
 //! Parallel light from infinitely far away, such as the sun's.
 
-use super::importance::{facing, mean};
 use glam::Vec3;
 use tyndall_math::Ray;
 use tyndall_transport::LightSample;
+use tyndall_transport::importance::{facing, mean};
 
 /// Light that travels in one direction everywhere.
 #[derive(Clone, Copy, Debug)]

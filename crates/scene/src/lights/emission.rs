@@ -1,9 +1,9 @@
 //! What an emitting triangle sends out, point by point.
 
-use super::importance::mean;
 use crate::triangles::Surfaces;
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
+use tyndall_transport::importance::mean;
 
 /// Emitted radiance over a triangle or rectangle.
 #[derive(Clone, Debug)]

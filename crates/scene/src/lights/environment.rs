@@ -2,12 +2,12 @@
 //!
 //! Sampling follows the image: texels in proportion to the light they send, and between them as the light varies.
 
-use super::importance::mean;
 use super::sky::surface_share;
 use glam::{DVec3, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use tyndall_math::{Distribution2D, Ray};
 use tyndall_transport::LightSample;
+use tyndall_transport::importance::mean;
 
 /// Largest radiance of a texel, W/(m² sr); the sun's disc has 2·10⁷.
 const BRIGHTEST: f32 = 1e30;

@@ -1,10 +1,11 @@
 //! What flat emitters have in common: a side, an area, and an estimate of the light they bring.
 
 use super::Emission;
-use super::importance::{facing, inverse_square_along};
 use glam::Vec3;
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_PI_2, PI};
 use tyndall_math::Ray;
+use tyndall_transport::importance::{bounded, facing, inverse_square_along};
+use tyndall_transport::light_tree::{Cone, LightBounds};
 
 /// A flat patch that emits on its front side, or on both.
 #[derive(Clone, Debug)]
@@ -76,6 +77,24 @@ impl FlatEmitter {
     pub fn power(&self) -> Vec3 {
         let sides = if self.double_sided { 2.0 } else { 1.0 };
         self.emission.mean() * (PI * self.area * sides)
+    }
+
+    /// A sphere around it and the directions it shines in, with a mean cosine of 1/2.
+    pub(super) fn bounds(&self) -> LightBounds {
+        let cone = if self.double_sided {
+            Cone::SPHERE
+        } else {
+            Cone {
+                axis: self.normal,
+                half_angle: FRAC_PI_2,
+            }
+        };
+        LightBounds {
+            center: self.center,
+            radius: self.radius_squared.sqrt(),
+            cone,
+            intensity: bounded(0.5 * self.emission.weight() * self.area),
+        }
     }
 
     /// Distance of `p` from the plane, positive in front.

@@ -9,7 +9,6 @@ mod emitters;
 mod environment;
 mod environment_file;
 mod flat;
-mod importance;
 mod point;
 mod quad;
 mod sky;
@@ -34,11 +33,12 @@ pub use triangle::TriangleLight;
 use crate::gltf::punctual::PunctualLight;
 use crate::triangles::Surfaces;
 use glam::{DVec3, Vec3};
-use importance::bounded;
 use std::collections::HashMap;
 use std::f32::consts::PI;
 use std::sync::Arc;
 use tyndall_math::{Jet, Ray};
+use tyndall_transport::importance::bounded;
+use tyndall_transport::light_tree::{LightBounds, LightTree};
 use tyndall_transport::{LightSample, Lights};
 
 /// One light.
@@ -126,6 +126,17 @@ impl Light {
         }
     }
 
+    /// Where it is and which way it shines; `None` where it is infinitely far away.
+    fn bounds(&self) -> Option<LightBounds> {
+        match self {
+            Light::Point(light) => Some(light.bounds()),
+            Light::Spot(light) => Some(light.bounds()),
+            Light::Triangle(light) => Some(light.flat().bounds()),
+            Light::Quad(light) => Some(light.flat().bounds()),
+            Light::Directional(_) | Light::Sky(_) | Light::Environment(_) => None,
+        }
+    }
+
     fn sample(&self, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
         each!(self, light => light.sample(p, u))
     }
@@ -171,7 +182,11 @@ pub struct LightSet {
     lights: Vec<Light>,
     environment: Vec<usize>,
     point_positions: Vec<Vec3>,
+    tree: Option<LightTree>,
 }
+
+/// So many lights are looked at one by one: a tree would take as long (measured 2026-11-22).
+const FEW: usize = 16;
 
 impl LightSet {
     /// The given lights and those that the emissive triangles of `surfaces` are; dark ones are left out.
@@ -190,6 +205,10 @@ impl LightSet {
         for emitter in emitters::find(surfaces) {
             light_of_triangle.extend(emitter.triangles.iter().map(|&t| (t, set.lights.len())));
             set.push(emitter.light);
+        }
+        if set.lights.len() > FEW {
+            let bounds: Vec<_> = set.lights.iter().map(Light::bounds).collect();
+            set.tree = Some(LightTree::new(&bounds));
         }
         (set, light_of_triangle)
     }
@@ -241,6 +260,10 @@ impl Lights for LightSet {
             Light::Point(_) | Light::Spot(_) | Light::Directional(_) => false,
             Light::Triangle(_) | Light::Quad(_) | Light::Sky(_) | Light::Environment(_) => true,
         }
+    }
+
+    fn tree(&self) -> Option<&LightTree> {
+        self.tree.as_ref()
     }
 
     fn sample(&self, light: usize, p: Vec3, u: [f32; 2]) -> Option<LightSample> {

@@ -1,10 +1,11 @@
 //! A lamp without extent that shines equally into all directions.
 
-use super::importance::{facing, inverse_square_along, mean};
 use glam::Vec3;
 use std::f32::consts::PI;
 use tyndall_math::Ray;
 use tyndall_transport::LightSample;
+use tyndall_transport::importance::{bounded, facing, inverse_square_along, mean};
+use tyndall_transport::light_tree::{Cone, LightBounds};
 
 /// An isotropic lamp at a point.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +36,16 @@ impl PointLight {
     /// Radiant power 4π I, in W.
     pub fn power(&self) -> Vec3 {
         self.intensity * (4.0 * PI)
+    }
+
+    /// Its place; it shines in all directions.
+    pub(super) fn bounds(&self) -> LightBounds {
+        LightBounds {
+            center: self.position,
+            radius: 0.0,
+            cone: Cone::SPHERE,
+            intensity: bounded(mean(self.intensity)),
+        }
     }
 
     pub(super) fn importance(&self, p: Vec3, normal: Option<Vec3>) -> f32 {

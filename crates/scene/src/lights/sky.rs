@@ -1,10 +1,10 @@
 //! Light of one colour from all directions.
 
-use super::importance::mean;
 use glam::Vec3;
 use std::f32::consts::PI;
 use tyndall_math::{Ray, warp};
 use tyndall_transport::LightSample;
+use tyndall_transport::importance::mean;
 
 /// A constant environment.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,12 @@
 //! A lamp without extent that shines into a cone, as in `KHR_lights_punctual`.
 
-use super::importance::{facing, mean};
 use super::point::towards_lamp;
 use glam::{DVec3, Vec3};
 use std::f32::consts::{PI, TAU};
 use tyndall_math::{Jet, Ray, warp::Equiangular};
 use tyndall_transport::LightSample;
+use tyndall_transport::importance::{bounded, facing, mean};
+use tyndall_transport::light_tree::{Cone, LightBounds};
 
 /// A lamp whose intensity falls off between two cones around an axis.
 ///
@@ -62,6 +63,21 @@ impl SpotLight {
     pub fn power(&self) -> Vec3 {
         let ramp = self.outer_versine - self.inner_versine;
         self.intensity * (TAU * (self.inner_versine + ramp / 3.0))
+    }
+
+    /// Its place and its cone, with a margin against rounding.
+    pub(super) fn bounds(&self) -> LightBounds {
+        const MARGIN: f32 = 1e-3;
+        let cone = Cone {
+            axis: self.direction,
+            half_angle: (self.outer_cone + MARGIN).min(PI),
+        };
+        LightBounds {
+            center: self.position,
+            radius: 0.0,
+            cone,
+            intensity: bounded(mean(self.power()) / cone.solid_angle()),
+        }
     }
 
     /// The falloff for light that leaves the lamp along the unit vector `w`, in [0, 1].

@@ -19,7 +19,7 @@ pub struct Inscatter<'w, 'm, G, L> {
     pub(super) world: &'w World<'m, G, L>,
     pub(super) x: Vec3,
     pub(super) medium: MediumPoint<'m>,
-    choice: LightChoice,
+    choice: LightChoice<'w>,
     /// Towards the eye; any direction where nothing depends on it.
     pub(super) w_o: Vec3,
     /// Weights all directions alike, whatever the medium does.

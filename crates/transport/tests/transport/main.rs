@@ -8,6 +8,7 @@
 mod exact;
 mod field;
 mod inscatter;
+mod light_choice;
 mod rig;
 mod samplers;
 mod second_order;

@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
 use tyndall_media::{Media, Medium, MediumParams, PhaseFunction, Region};
 use tyndall_transport::layers::{LayerVisitor, Layers};
+use tyndall_transport::light_tree::{Cone, LightBounds, LightTree};
 use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
 use tyndall_transport::{Bsdf, Geometry, LightSample, Lights, SurfaceHit, World};
 
@@ -53,6 +54,7 @@ pub(crate) struct Lamps {
     pub(crate) points: Vec<(Vec3, f32)>,
     pub(crate) sky: f32,
     sky_index: Vec<usize>,
+    tree: Option<LightTree>,
 }
 
 impl Lamps {
@@ -71,11 +73,28 @@ impl Lamps {
         }
     }
 
+    /// The same lights, to be chosen from by a tree.
+    pub(crate) fn in_a_tree(self) -> Self {
+        let lamp = |&(center, intensity): &(Vec3, f32)| LightBounds {
+            center,
+            radius: 0.0,
+            cone: Cone::SPHERE,
+            intensity,
+        };
+        let mut bounds: Vec<_> = self.points.iter().map(|point| Some(lamp(point))).collect();
+        bounds.resize(self.count(), None);
+        Self {
+            tree: Some(LightTree::new(&bounds)),
+            ..self
+        }
+    }
+
     pub(crate) fn sky(sky: f32) -> Self {
         Self {
             points: Vec::new(),
             sky,
             sky_index: vec![0],
+            tree: None,
         }
     }
 }
@@ -97,6 +116,10 @@ impl Lights for Lamps {
             .map_or(4.0 * PI * self.sky * t_max, |(q, i)| {
                 i * warp::Equiangular::new(ray, *q, 0.0, t_max).angle_over_distance()
             })
+    }
+
+    fn tree(&self) -> Option<&LightTree> {
+        self.tree.as_ref()
     }
 
     fn pivot(&self, light: usize) -> Option<Vec3> {

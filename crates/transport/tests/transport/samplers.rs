@@ -153,35 +153,6 @@ fn distances_of_single_scattering_follow_their_density() {
 }
 
 #[test]
-fn lights_are_chosen_with_the_chance_that_is_told() {
-    let lights = Lamps::points(&[
-        (Vec3::new(1.0, 0.0, 0.0), 1.0),
-        (Vec3::new(0.0, 3.0, 0.0), 20.0),
-        (Vec3::new(0.0, 0.0, 9.0), 0.01),
-    ])
-    .with_sky(0.05);
-    let at = LightChoice::at(&lights, Vec3::ZERO, None, 0.3);
-    let ray = Ray::new(Vec3::new(-2.0, 0.1, 0.0), Vec3::X);
-    let along = LightChoice::along(&lights, &ray, 5.0, 0.3);
-    for (i, choice) in [at, along].iter().enumerate() {
-        let n = 200_000;
-        let mut counts = [0_u64; 4];
-        for sample in 0..n {
-            let u = pair(400 + i as u64, sample);
-            let (light, chance) = choice.sample(u[0]).unwrap();
-            assert_eq!(chance, choice.pdf(light));
-            counts[light] += 1;
-        }
-        let expected: Vec<f64> = (0..4)
-            .map(|l| f64::from(choice.pdf(l)) * n as f64)
-            .collect();
-        assert!((expected.iter().sum::<f64>() / n as f64 - 1.0).abs() < 1e-6);
-        let result = chi_square_test(&counts, &expected);
-        assert!(result.p_value >= FALSE_ALARM_RATE, "{result:?}");
-    }
-}
-
-#[test]
 fn directions_around_lamps_follow_their_density() {
     let lights = Lamps::points(&[
         (Vec3::new(0.3, 0.4, 1.0), 1.0),

@@ -7,7 +7,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use tyndall_math::Ray;
 
 /// Keeps estimates such that thousands of them can be summed in f32: a point may lie on a lamp.
-pub(super) fn bounded(importance: f32) -> f32 {
+pub fn bounded(importance: f32) -> f32 {
     const LARGEST: f32 = 1e30;
     importance.min(LARGEST)
 }
@@ -17,12 +17,7 @@ pub(super) fn bounded(importance: f32) -> f32 {
 ///
 /// With H² = r² + h² and the range's ends at t₀ + a and t₀ + b it is atan2(H (b − a), H² + a b) / H, which never subtracts two
 /// nearly equal angles.
-pub(super) fn inverse_square_along(
-    ray: &Ray,
-    pivot: Vec3,
-    radius_squared: f32,
-    range: [f32; 2],
-) -> f32 {
+pub fn inverse_square_along(ray: &Ray, pivot: Vec3, radius_squared: f32, range: [f32; 2]) -> f32 {
     let to_pivot = pivot - ray.origin;
     let nearest = to_pivot.dot(ray.direction);
     let h2 = (to_pivot - ray.direction * nearest).length_squared() + radius_squared;
@@ -55,7 +50,7 @@ fn angle(y: f32, x: f32) -> f32 {
 }
 
 /// Mean of the three channels: the one number by which lights are compared.
-pub(super) fn mean(color: Vec3) -> f32 {
+pub fn mean(color: Vec3) -> f32 {
     color.element_sum() / 3.0
 }
 
@@ -63,7 +58,7 @@ pub(super) fn mean(color: Vec3) -> f32 {
 /// `normal` there: a bound on the cosine, 0 only where the whole light stands behind the surface; 1 in a medium.
 ///
 /// The floor keeps lights alive that graze: a shading normal may lean towards them.
-pub(super) fn facing(p: Vec3, normal: Option<Vec3>, center: Vec3, radius: f32) -> f32 {
+pub fn facing(p: Vec3, normal: Option<Vec3>, center: Vec3, radius: f32) -> f32 {
     const LEAST: f32 = 0.1;
     let Some(normal) = normal else {
         return 1.0;
