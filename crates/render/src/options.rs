@@ -171,9 +171,9 @@ impl FromStr for Crop {
 pub struct RenderOptions {
     /// How light is computed.
     pub integrator: Integrator,
-    /// Where camera rays find multiple scattering.
+    /// Where camera rays find multiple scattering; records where there is no field, as where depth is limited.
     pub multiple: MultipleFrom,
-    /// Where camera rays find single scattering.
+    /// Where camera rays find single scattering of light from skies; samples where records hold none (see the README's limits).
     pub single: SingleFrom,
     /// What kind of records to use; only with [`Integrator::Cache`].
     pub method: Option<Method>,
@@ -231,6 +231,19 @@ impl RenderOptions {
             "given".to_owned(),
             "left out with --integrator path, which has no records",
         )?;
+        let is_ours = self.integrator == Integrator::Cache
+            && self.method.unwrap_or_default() == Method::Tyndall;
+        for (option, is_auto) in [
+            ("--multiple", self.multiple == MultipleFrom::Auto),
+            ("--single", self.single == SingleFrom::Auto),
+        ] {
+            range(
+                option,
+                is_auto || is_ours,
+                "given".to_owned(),
+                "left out with --integrator path and --method jarosz08, which leave no choice",
+            )?;
+        }
         if let Some(spp) = self.spp {
             range("--spp", spp > 0, spp.to_string(), "at least 1")?;
         }

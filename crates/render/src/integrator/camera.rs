@@ -27,16 +27,16 @@ use tyndall_transport::{direct, emission};
 const SHAFT_PROBES: u32 = 24;
 /// Single-scattering samples along each camera ray of the cached integrator, for all other light.
 const SINGLE_SAMPLES: u32 = 2;
-/// Lookups of multiple scattering along each camera ray.
-const MULTIPLE_SAMPLES: u32 = 4;
+/// Places on each camera ray at which a cache of light in media is asked.
+const MEDIA_SAMPLES: u32 = 4;
 /// Where no record is valid the nearest one stands in, within this share of the distance to the eye.
 const MAKESHIFT: f32 = 0.05;
 /// Parts of a camera sample's work beside the path behind the first surface; each has numbers of its own.
-const FOG_PART: u64 = 1;
-const PATHS_PART: u64 = 2;
-const SKY_PART: u64 = 3;
-const GLOSS_PART: u64 = 4;
-const SINGLE_PART: u64 = 5;
+const FOG_PART: u64 = 16;
+const PATHS_PART: u64 = 17;
+const SKY_PART: u64 = 18;
+const GLOSS_PART: u64 = 19;
+const SINGLE_PART: u64 = 20;
 
 /// Scattering events that light of the `multiple` layer has had at least: media's own emission needs only the last.
 pub(crate) fn least_multiple_depth(scene: &Scene) -> u32 {
@@ -376,9 +376,8 @@ impl<'s> Camera<'s> {
         let media = &self.scene.media;
         let offset = sampler.next_1d();
         let mut sum = Vec3::ZERO;
-        for i in 0..MULTIPLE_SAMPLES {
-            let Some(t) = flight.sample_inside((i as f32 + offset) / MULTIPLE_SAMPLES as f32)
-            else {
+        for i in 0..MEDIA_SAMPLES {
+            let Some(t) = flight.sample_inside((i as f32 + offset) / MEDIA_SAMPLES as f32) else {
                 continue;
             };
             let x = ray.at(t);
@@ -386,7 +385,7 @@ impl<'s> Camera<'s> {
             let stop = flight.stop(t);
             sum += stop.transmittance * media.at(x).sigma_s * radiance / flight.pdf_inside(&stop);
         }
-        sum / MULTIPLE_SAMPLES as f32
+        sum / MEDIA_SAMPLES as f32
     }
 
     /// What `cache` knows of light at `x`, which is `t` metres from the eye; where it knows nothing, what `trace` finds.

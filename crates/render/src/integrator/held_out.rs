@@ -19,8 +19,8 @@ use tyndall_transport::irradiance::irradiance;
 use tyndall_transport::path::Reach;
 use tyndall_transport::world::Geometry;
 
-/// One of so many blocks of the pilot is looked at.
-const EVERY: usize = 4;
+/// One of so many blocks of the pilot is looked at; no divisor of a row's blocks, so that all columns have their turn.
+const EVERY: usize = 5;
 /// Places on a camera ray at which light in media is compared: errors of places far apart cancel in a pixel, as they do here.
 const PLACES: usize = 2;
 /// Keeps the numbers of these evaluations from those of the finished image's.
@@ -51,31 +51,31 @@ pub(super) struct HeldOut<'s> {
     pub(super) seed: u64,
     pub(super) reach: Reach<'s>,
     pub(super) pilot: &'s Pilot,
-    /// When to stop: places not looked at by then count as right.
+    /// When to stop.
     pub(super) deadline: Option<Instant>,
 }
 
 impl HeldOut<'_> {
     /// What errors of `read` add to the relative error of the image, and the rays it took to know. Each gather takes `n_rays`, or
-    /// [`MOST_RAYS`].
-    pub(super) fn error(&self, read: Read<'_>, n_rays: usize) -> (f64, u64) {
+    /// [`MOST_RAYS`]. No error is known where the deadline came first.
+    pub(super) fn error(&self, read: Read<'_>, n_rays: usize) -> (Option<f64>, u64) {
         let pattern = GatherPattern::new(n_rays.min(MOST_RAYS));
         let geometry = Counted::new(self.scene);
         let blocks: Vec<usize> = (0..self.pilot.len()).step_by(EVERY).collect();
-        let squared: f64 = (blocks.par_iter())
+        let squared: Option<f64> = (blocks.par_iter())
             .map(|&block| {
                 if self.deadline.is_some_and(|d| Instant::now() >= d) {
-                    return 0.0;
+                    return None;
                 }
                 let found = self.difference(&geometry, read, block, &pattern);
                 let [d1, d2] = found.unwrap_or_default().map(Vec3::as_dvec3);
-                (d1 * d2 * self.pilot.weight(block)).element_sum() / 3.0
+                Some((d1 * d2 * self.pilot.weight(block)).element_sum() / 3.0)
             })
-            .collect::<Vec<f64>>()
-            .iter()
+            .collect::<Vec<Option<f64>>>()
+            .into_iter()
             .sum();
-        let mean = squared / blocks.len() as f64;
-        (mean.max(0.0).sqrt(), geometry.rays())
+        let root = |sum: f64| (sum / blocks.len() as f64).max(0.0).sqrt();
+        (squared.map(root), geometry.rays())
     }
 
     /// By how much what is read differs from two gathers on a camera ray through `block`; `None` where nothing is read.

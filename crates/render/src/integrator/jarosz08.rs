@@ -34,7 +34,14 @@ impl Run<'_> {
                 error,
             })
         });
+        let unknown = [
+            ("single", single.is_some()),
+            ("multiple", multiple.is_some()),
+            ("surface", surface.is_some()),
+        ];
+        let filled = unknown.into_iter().filter(|(_, filled)| *filled);
         Prepared {
+            shares: filled.map(|(layer, _)| (layer, None)).collect(),
             single,
             multiple,
             surface,

@@ -39,7 +39,8 @@ const FIRST_SAMPLES: u32 = 8;
 const GROWTH: u32 = 4;
 /// Samples per pixel at which a render ends even if its error is not met.
 const MOST_SAMPLES: u32 = 1 << 20;
-/// Least and greatest share of the target error that noise may take when records are interpolated; the rest is left to these.
+/// Least and greatest share of the target error that noise may take where the field or records are read; the rest is left to these. The
+/// least, where their error is not known.
 const NOISE_SHARES: [f64; 2] = [0.6, 0.85];
 
 /// An image errs more than asked where its error is this many times that; what is held out tells errors with some error of its own.
@@ -167,10 +168,10 @@ impl<'s> Run<'s> {
 
         let rendering = Instant::now();
         let reach = prepared.reach(self.max_depth);
-        let target = self.noise_target(prepared.error());
+        let target = self.noise_target(&prepared);
         let known = prepared.known(way);
         let (tally, timed_out) = self.sample(&mut film, target, &known, reach);
-        stats.error_shares.extend(prepared.shares.iter().copied());
+        stats.error_shares.extend(prepared.known_shares());
         if let Some(noise) = film.noise() {
             stats.error_shares.insert("noise", noise.error());
         }
@@ -228,8 +229,11 @@ impl<'s> Run<'s> {
                     .to_owned(),
             );
         }
-        if self.options.spp.is_none() && prepared.error() > TOLERATED * f64::from(self.error) {
-            notes.push(self.short_of_error(&prepared));
+        let tolerated = TOLERATED * f64::from(self.error);
+        if let Some(error) = prepared.error().filter(|&error| error > tolerated)
+            && self.options.spp.is_none()
+        {
+            notes.push(short_of_error(&prepared, error));
         }
         let count = |kind: &str| grouped(stats.records.get(kind).copied().unwrap_or(0));
         let surface = count("surface");
@@ -241,6 +245,11 @@ impl<'s> Run<'s> {
         let found = match way {
             Way::PathIntegrator => "integrator: path".to_owned(),
             Way::NoMultiple => format!("records: {surface} surface; single: {how_single}; SH: off"),
+            Way::Records if prepared.reads_field => {
+                format!(
+                    "multiple: coarse field; records: {surface} surface; single: {how_single}; SH: off"
+                )
+            }
             Way::Records => format!(
                 "records: {} multiple, {surface} surface; single: {how_single}; SH: off",
                 count("multiple")
@@ -263,18 +272,6 @@ impl<'s> Run<'s> {
             timed_out: timed_out || cut_short,
             summary: format!("{}; {found}", self.scene.summary()),
         })
-    }
-
-    /// Says that records err more than the image may, and which of them most.
-    fn short_of_error(&self, prepared: &Prepared) -> String {
-        let worst = (prepared.shares.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
-        let (layer, share) = worst.copied().unwrap_or_default();
-        format!(
-            "the error asked for may not be met: light known ahead of the image is off by {:.1} % of it, most of that ({:.1} %) in the \
-             `{layer}` layer; a smaller --error gives more and better records",
-            100.0 * prepared.error(),
-            100.0 * share
-        )
     }
 
     fn is_lit(&self) -> bool {
@@ -356,15 +353,15 @@ impl<'s> Run<'s> {
         fill.run(self.progress)
     }
 
-    /// The noise up to which samples are taken, where what was computed before makes an error of `prepared`: errors add in squares.
-    fn noise_target(&self, prepared: f64) -> f64 {
+    /// The noise up to which samples are taken, beside the error of what was `prepared`: errors add in squares.
+    fn noise_target(&self, prepared: &Prepared) -> f64 {
         let error = f64::from(self.error);
-        if self.options.integrator == Integrator::Path {
+        if prepared.is_empty() {
             return error;
         }
         let [least, most] = NOISE_SHARES;
-        let left = 1.0 - (prepared / error).powi(2);
-        error * left.max(0.0).sqrt().clamp(least, most)
+        let left = prepared.error().map(|own| 1.0 - (own / error).powi(2));
+        error * left.unwrap_or(0.0).max(0.0).sqrt().clamp(least, most)
     }
 
     /// Takes samples in passes until the samples asked for or the `target` of noise are reached, or the time is up.
@@ -507,6 +504,18 @@ impl<'s> Run<'s> {
         };
         (pass, samples)
     }
+}
+
+/// Says that what was computed ahead errs more than the image may, and which part of it most.
+fn short_of_error(prepared: &Prepared, error: f64) -> String {
+    let worst = prepared.known_shares().max_by(|a, b| a.1.total_cmp(&b.1));
+    let (layer, share) = worst.unwrap_or_default();
+    format!(
+        "the error asked for may not be met: light known ahead of the image is off by {:.1} % of it, most of that ({:.1} %) in the \
+         `{layer}` layer; a smaller --error gives more and better records",
+        100.0 * error,
+        100.0 * share
+    )
 }
 
 /// What a pass over the image came to.

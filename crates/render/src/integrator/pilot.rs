@@ -16,7 +16,7 @@ const BLOCKS: [u32; 2] = [16, 12];
 const SAMPLES: u32 = 16;
 /// Errors of a part over that of the image, at least and most.
 const RANGE: [f32; 2] = [0.6, 3.0];
-/// A part may not be less well known than this, whatever it adds.
+/// No part may be less well known than this, whatever it adds.
 const COARSEST: f32 = 0.2;
 /// Light from skies is left to samples where its share is less than this part of the error asked for.
 const NEGLIGIBLE: f32 = 0.25;
@@ -132,7 +132,7 @@ impl Pilot {
         let [least, most] = RANGE.map(|factor| factor * error);
         // Where the image is black a share is not a number, and the most is allowed.
         let allowed =
-            |gain: f32, share: f32| (error * gain / share).min(most).min(COARSEST).max(least);
+            |gain: f32, share: f32| (error * gain / share).min(most).max(least).min(COARSEST);
         let sky = share(|b| b.sky);
         Plan {
             multiple: allowed(Plan::SCATTERED, share(|b| b.pixel.multiple)),
@@ -174,11 +174,16 @@ fn mean_of_block(
         let [x, y] = place(block, sampler.next_2d());
         let [x, y] = [(x, w), (y, h)].map(|(share, n)| ((share * n as f32) as u32).min(n - 1));
         let found = camera.cached(x, y, &mut sampler.branch(0), known);
+        let sky = camera.sky(x, y, &mut sampler.branch(0));
+        // One that is not finite would hide all others.
+        if !(beauty(&found) + sky).is_finite() {
+            continue;
+        }
         mean.pixel.surface += found.surface * share;
         mean.pixel.single += found.single * share;
         mean.pixel.multiple += found.multiple * share;
         mean.pixel.emission += found.emission * share;
-        mean.sky += camera.sky(x, y, &mut sampler.branch(0)) * share;
+        mean.sky += sky * share;
     }
     mean
 }

@@ -14,6 +14,7 @@ use super::{FILL_DEADLINE, Run, Way};
 use crate::image::Image;
 use crate::options::{Crop, MultipleFrom};
 use crate::stats::Stats;
+use std::time::Instant;
 use tyndall_transport::path::Reach;
 use tyndall_transport::walls::Walls;
 
@@ -29,8 +30,10 @@ pub(super) struct Prepared {
     /// Single scattering of all light.
     pub(super) single: Option<Filled<Walls>>,
     pub(super) surface: Option<Filled<Side>>,
-    /// What each part of it adds to the relative error of the image, by layer.
-    pub(super) shares: Vec<(&'static str, f64)>,
+    /// What each part of it adds to the relative error of the image, by layer, where that is known.
+    pub(super) shares: Vec<(&'static str, Option<f64>)>,
+    /// Whether the deadline came before all of it was done and measured.
+    pub(super) deadline_passed: bool,
     /// Rays of the pilot and of the evaluations.
     pub(super) rays: u64,
 }
@@ -60,6 +63,11 @@ impl Prepared {
         }
     }
 
+    /// Whether nothing was computed ahead.
+    pub(super) fn is_empty(&self) -> bool {
+        self.field.is_none() && self.shares.is_empty()
+    }
+
     /// Whether the time limit ended any of it.
     pub(super) fn is_cut_short(&self) -> bool {
         let media = [&self.multiple, &self.sky, &self.single]
@@ -68,12 +76,20 @@ impl Prepared {
         media.into_iter().any(|filled| filled.cut_short)
             || self.surface.as_ref().is_some_and(|filled| filled.cut_short)
             || self.field.as_ref().is_some_and(|filled| filled.cut_short)
+            || self.deadline_passed
     }
 
-    /// The relative error that all of it makes together.
-    pub(super) fn error(&self) -> f64 {
-        let squared = self.shares.iter().map(|(_, share)| share * share);
-        squared.sum::<f64>().sqrt()
+    /// What each part adds to the relative error of the image, as far as it is known.
+    pub(super) fn known_shares(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        let shares = self.shares.iter();
+        shares.filter_map(|&(layer, share)| Some((layer, share?)))
+    }
+
+    /// The relative error that all of it makes together; `None` where there is something whose error is not known.
+    pub(super) fn error(&self) -> Option<f64> {
+        let squared = |share: &Option<f64>| share.map(|share| share * share);
+        let sum: Option<f64> = self.shares.iter().map(|(_, share)| squared(share)).sum();
+        sum.map(f64::sqrt)
     }
 
     /// Shows the records in the layers of `image`, the part `crop` of the frame, that are for that.
@@ -149,13 +165,12 @@ impl Run<'_> {
             let in_field = reach
                 .field
                 .filter(|_| self.options.multiple != MultipleFrom::Records);
-            let field_error = in_field.map(|field| check(Read::Field(field), kind.n_rays()));
+            let field_error = in_field.and_then(|field| check(Read::Field(field), kind.n_rays()));
             let allowed = f64::from(Plan::SCATTERED * self.error);
-            prepared.reads_field = self.options.multiple == MultipleFrom::Field
-                && in_field.is_some()
-                || field_error.is_some_and(|error| error <= allowed);
+            let is_forced = self.options.multiple == MultipleFrom::Field && in_field.is_some();
+            prepared.reads_field = is_forced || field_error.is_some_and(|error| error <= allowed);
             let error = if prepared.reads_field {
-                field_error.unwrap_or(0.0)
+                field_error
             } else {
                 let n_rays = kind.n_rays();
                 let filled = self.fill(kind);
@@ -188,6 +203,9 @@ impl Run<'_> {
             prepared.surface = Some(filled);
         }
         prepared.shares = shares;
+        prepared.deadline_passed = self
+            .deadline(FILL_DEADLINE)
+            .is_some_and(|d| Instant::now() >= d);
         prepared.rays = rays;
         prepared.field = field;
         prepared

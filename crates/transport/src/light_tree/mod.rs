@@ -39,8 +39,9 @@ pub struct LightTree {
     lights: Vec<u32>,
     /// The place of each light.
     places: Vec<u32>,
-    /// Intensities of the lights before each place, summed.
-    intensity_before: Vec<f32>,
+    /// Intensities of the lights before each place, summed. f64, because a lamp's share is a difference of sums that a far brighter one
+    /// may be part of.
+    intensity_before: Vec<f64>,
     /// Number of lights without bounds.
     n_far: u32,
 }
@@ -63,7 +64,7 @@ impl LightTree {
         let mut sum = 0.0;
         for (light, bounds) in bounded {
             lights.push(light);
-            sum += bounds.intensity;
+            sum += f64::from(bounds.intensity);
             intensity_before.push(sum);
         }
         let mut places = vec![0; lights.len()];
@@ -104,12 +105,17 @@ impl LightTree {
         self.places[light]
     }
 
-    /// Picks one of the neighbours `places` in proportion to intensity; `u` in [0, 1).
+    /// Picks one of the neighbours `places` in proportion to intensity, or evenly where they have none; `u` in [0, 1).
     pub(crate) fn pick(&self, places: &Range<u32>, u: f32) -> u32 {
         let [start, end] = [places.start, places.end].map(|place| place as usize);
         let sums = &self.intensity_before[start..=end];
-        let target = sums[0] + u * (sums[end - start] - sums[0]);
-        let above = sums[1..].partition_point(|&sum| sum <= target) as u32;
+        let total = sums[end - start] - sums[0];
+        let above = if total > 0.0 {
+            let target = sums[0] + f64::from(u) * total;
+            sums[1..].partition_point(|&sum| sum <= target) as u32
+        } else {
+            (u * (end - start) as f32) as u32
+        };
         (places.start + above).min(places.end - 1)
     }
 
@@ -118,7 +124,12 @@ impl LightTree {
         let intensity = |start: u32, end: u32| {
             self.intensity_before[end as usize] - self.intensity_before[start as usize]
         };
-        intensity(place, place + 1) / intensity(places.start, places.end).max(f32::MIN_POSITIVE)
+        let total = intensity(places.start, places.end);
+        if total > 0.0 {
+            (intensity(place, place + 1) / total) as f32
+        } else {
+            1.0 / places.len() as f32
+        }
     }
 }
 
@@ -188,8 +199,29 @@ mod tests {
 
     #[test]
     fn a_light_is_picked_out_of_its_neighbours_with_the_chance_that_is_told() {
-        let tree = spiral(60);
-        for places in [20..21, 12..15, 13..60] {
+        let dim = |i: usize| {
+            if i == 0 {
+                1e9
+            } else {
+                1e-3 * (1 + i % 3) as f32
+            }
+        };
+        let beside_a_bright_lamp: Vec<_> = (0..60)
+            .map(|i| {
+                Some(LightBounds {
+                    center: Vec3::X * i as f32,
+                    radius: 0.0,
+                    cone: Cone::SPHERE,
+                    intensity: dim(i),
+                })
+            })
+            .collect();
+        let trees = [spiral(60), LightTree::new(&beside_a_bright_lamp)];
+        let groups = [20..21, 12..15, 13..60];
+        for (tree, places) in trees
+            .iter()
+            .flat_map(|t| groups.iter().map(move |p| (t, p.clone())))
+        {
             let n = 30_000;
             let mut counts = vec![0; places.len()];
             for i in 0..n {

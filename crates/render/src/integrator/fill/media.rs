@@ -95,7 +95,7 @@ impl<'s> Media<'s> {
     }
 }
 
-/// Multiple-scattered radiance at `p`, where records are valid.
+/// In-scattered radiance of the light that records hold at `p`, where they are valid.
 pub(in crate::integrator) fn lookup(cache: &MediaCache, p: Vec3) -> Option<Vec3> {
     cache
         .lookup_where(p, |walls, _| walls.hold(p))
@@ -203,8 +203,12 @@ impl Kind for Media<'_> {
         // are near on one side, and light does not end there. Edges count more: at half, the furnace was 0.25 % too bright.
         let edge = world.media.distance_to_boundary(x);
         let edge = if edge < g.nearest { 1.5 / edge } else { 0.0 };
+        let lamps = match self.holds {
+            Holds::Multiple(_) => 1.0 / world.lights.distance_to_point_lights(x),
+            Holds::Sky => 0.0,
+        };
         let inverse = 0.5 / g.harmonic_mean_distance
-            + 1.0 / world.lights.distance_to_point_lights(x)
+            + lamps
             + edge
             + world.media.at(x).sigma_t.element_sum() / 3.0
             + relative_slope(&g);

@@ -36,7 +36,7 @@ pub(in crate::integrator) struct Side {
     crowded: bool,
 }
 
-/// A cache of indirect irradiance over π.
+/// A cache of irradiance over π.
 pub(in crate::integrator) type SurfaceCache = Cache<3, Side>;
 
 /// Whether records serve the surface.
@@ -44,7 +44,7 @@ pub(in crate::integrator) fn holds(hit: &SurfaceHit) -> bool {
     !hit.bsdf.is_shiny()
 }
 
-/// Irradiance over π by indirect light at `p` on a surface with the unit `normal` towards the viewer, where records are valid.
+/// Irradiance over π by the light that records hold at `p` on a surface with the unit `normal` towards the viewer, where records are valid.
 pub(in crate::integrator) fn lookup(cache: &SurfaceCache, p: Vec3, normal: Vec3) -> Option<Vec3> {
     let crowded = Cell::new(false);
     let found = cache.lookup_where(p, |side, offset| {
@@ -72,7 +72,7 @@ impl Side {
     }
 }
 
-/// Indirect light on the surfaces that the camera sees.
+/// Light on the surfaces that the camera sees: indirect light, and that of skies.
 pub(in crate::integrator) struct Surfaces<'s> {
     pub(in crate::integrator) scene: &'s Scene,
     pub(in crate::integrator) frame: [u32; 2],
