@@ -2,7 +2,8 @@
 //! media", ACM TOG 27(1), with irradiance on surfaces beside them. The baseline that the records of the default method are compared with.
 //!
 //! Radii follow the light that was found and nothing else, and gradients do not know of occlusion. Ours are the sets of directions, which
-//! are better spread, and the gradients of multiple scattering, by warped translation: the paper's have no finite variance near lamps.
+//! are better spread, and the gradients of multiple scattering, by warped translation: the paper's have no finite variance near lamps. Values
+//! are blended as `tyndall-cache` does it.
 
 use super::surfaces::{Side, SurfaceCache, Surfaces};
 use super::{Candidate, Counted, Kind, media, record, surfaces};
