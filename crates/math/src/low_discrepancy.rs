@@ -51,8 +51,8 @@ impl SphericalFibonacci {
     }
 }
 
-/// 1/Φ = (√5 − 1)/2.
-const INVERSE_GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
+/// 1/Φ = (√5 − 1)/2, whose multiples are spread most evenly over [0, 1) when only their fractions count.
+pub const INVERSE_GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
 
 #[cfg(test)]
 mod tests {

@@ -3,13 +3,23 @@
 //! Counts in cells are compared with the integral of the density over them (Pearson's χ²). A [`Domain`] cuts what a
 //! sampler returns into cells: [`Directions`], [`Distances`] and [`UnitSquare`] serve most of them.
 
-use crate::{Frame, stats::chi_square_test};
+use crate::{Frame, Key, Purpose, Sampler, stats::chi_square_test};
 use glam::Vec3;
 use rand_pcg::{Pcg32, rand_core::Rng};
 use std::fmt::Debug;
 
 /// Probability that [`assert_conforms`] rejects a correct sampler, were its seed not fixed.
 pub const FALSE_ALARM_RATE: f64 = 1e-6;
+
+/// Random numbers for a test: those of a `seed`, and of one `index` of many.
+pub fn sampler(seed: u64, index: u64) -> Sampler {
+    let key = Key {
+        seed,
+        purpose: Purpose::Probe,
+        index,
+    };
+    Sampler::new(key, 0)
+}
 
 /// Samples drawn.
 const N_SAMPLES: u32 = 200_000;

@@ -7,7 +7,8 @@ use glam::Vec3;
 use std::hint::black_box;
 use std::path::Path;
 use tyndall_cache::{Cache, Record, Segment};
-use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
+use tyndall_math::testing::sampler;
+use tyndall_math::{Key, Purpose, Ray, warp};
 use tyndall_scene::{LoadOptions, Scene, load_str};
 use tyndall_transport::field::{CellWidths, Field, Filling};
 use tyndall_transport::gather::{self, GatherPattern};
@@ -25,23 +26,11 @@ const SPONZA: &str = "Scene(
     media: [Medium(sigma_t: (0.05, 0.05, 0.05), albedo: (0.9, 0.9, 0.9))],
 )";
 
-fn sampler(index: u64) -> Sampler {
-    let purpose = Purpose::Probe;
-    Sampler::new(
-        Key {
-            seed: 1,
-            purpose,
-            index,
-        },
-        0,
-    )
-}
-
 /// A unit cube of records of which eight hold a point on the average.
 fn cache(n: usize) -> Cache<3> {
     let radius = (8.0 / (n as f32 * 4.0 / 3.0 * std::f32::consts::PI)).cbrt();
     let record = |index| {
-        let mut u = sampler(index);
+        let mut u = sampler(1, index);
         let [x, y] = u.next_2d();
         Record {
             position: Vec3::new(x, y, u.next_1d()),
@@ -85,7 +74,7 @@ fn rays(scene: &Scene) -> Vec<Ray> {
     let bounds = scene.geometry.bounds();
     let extent = (bounds.max - bounds.min) * 0.4;
     let ray = |index| {
-        let mut u = sampler(index);
+        let mut u = sampler(1, index);
         let [x, y] = u.next_2d();
         let place = Vec3::new(x, y, u.next_1d()) - 0.5;
         Ray::new(
@@ -99,22 +88,14 @@ fn rays(scene: &Scene) -> Vec<Ray> {
 /// A field of what 20 000 walks found.
 fn field(scene: &Scene) -> Field {
     let world = scene.world();
-    let mut filling = Filling::new(CellWidths::around(scene.camera.eye(), 1.0 / 24.0, 1e-4));
+    let widths = CellWidths::around(scene.camera.eye(), 1.0 / 24.0, 1e-4);
     let mut found = Vec::new();
     for walk in 0..20_000 {
-        let mut u = sampler(walk);
+        let mut u = sampler(1, walk);
         let [x, y] = u.next_2d();
         Filling::walk(&world, scene.camera.ray(x, y, 1, 1), &mut u, &mut found);
     }
-    let cells = filling.place(&found);
-    for (found, &cell) in found.iter().zip(&cells) {
-        let side = filling.side(world.geometry, cell, found);
-        filling.add(world.geometry, cell, side, found);
-    }
-    let mut field = filling.end(world.geometry);
-    let around = (0..field.len()).map(|cell| field.surroundings_of(world.geometry, cell));
-    field.set_surroundings(around.collect());
-    field
+    Field::new(world.geometry, widths, &found)
 }
 
 fn sponza(criterion: &mut Criterion) {

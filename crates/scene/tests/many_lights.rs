@@ -3,21 +3,13 @@
 
 use glam::Vec3;
 use std::sync::Arc;
-use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
+use tyndall_math::testing::sampler;
+use tyndall_math::{Ray, Sampler, warp};
 use tyndall_scene::lights::{
     DirectionalLight, Light, LightSet, PointLight, QuadLight, SkyLight, SpotLight,
 };
 use tyndall_transport::Lights;
 use tyndall_transport::light_choice::LightChoice;
-
-fn random(seed: u64, index: u64) -> Sampler {
-    let key = Key {
-        seed,
-        purpose: Purpose::Probe,
-        index,
-    };
-    Sampler::new(key, 0)
-}
 
 fn in_the_box(random: &mut Sampler) -> Vec3 {
     let [x, z] = random.next_2d();
@@ -27,7 +19,7 @@ fn in_the_box(random: &mut Sampler) -> Vec3 {
 /// Lamps, spots that shine down and panels that face anywhere in a flat box of 60 m, a sun and a sky.
 fn town() -> LightSet {
     let lamps = (0..300).map(|i| {
-        let mut random = random(1, i);
+        let mut random = sampler(1, i);
         let p = in_the_box(&mut random);
         let direction = warp::uniform_sphere(random.next_2d());
         match i % 3 {
@@ -70,7 +62,7 @@ fn second_moment(importance: impl Fn(usize, u64) -> f32, choice: impl Fn(u64) ->
 fn choices_in_clusters_are_nearly_those_one_by_one() {
     let town = town();
     assert!(town.tree().is_some());
-    let p = |place| in_the_box(&mut random(2, place));
+    let p = |place| in_the_box(&mut sampler(2, place));
     let chances = |choice: LightChoice<'_>| {
         let chances: Vec<f32> = (0..town.count()).map(|light| choice.pdf(light)).collect();
         // Running sums in f32, some hundred lights long.
@@ -85,7 +77,7 @@ fn choices_in_clusters_are_nearly_those_one_by_one() {
         );
         assert!(found < most, "{normal:?} {found}");
     }
-    let ray = |place| Ray::new(p(place), warp::uniform_sphere(random(3, place).next_2d()));
+    let ray = |place| Ray::new(p(place), warp::uniform_sphere(sampler(3, place).next_2d()));
     let found = second_moment(
         |light, place| town.importance_along(light, &ray(place), 20.0),
         |place| chances(LightChoice::along(&town, &ray(place), 20.0, 0.0)),

@@ -4,11 +4,10 @@ use crate::light_choice::LightChoice;
 use crate::single::unoccluded;
 use crate::world::{Geometry, LightSample, Lights, SurfaceHit, World};
 use glam::Vec3;
+use tyndall_math::low_discrepancy::INVERSE_GOLDEN_RATIO;
 
 /// Samples of each sky: few directions meet it where it is seen through windows, and shadow rays are the cheapest part of a vertex.
 const SKY_SAMPLES: u32 = 4;
-/// 1/Φ, whose multiples are spread most evenly over [0, 1).
-const INVERSE_GOLDEN_RATIO: f32 = 0.618_034;
 
 /// Light from one direction.
 #[derive(Clone, Copy, Debug)]
@@ -21,24 +20,16 @@ pub struct DirectSample {
     pub light: LightSample,
 }
 
-/// Light that arrives at `p` in a medium; `choice` picks the light and `u` the place on it.
-pub fn in_medium<G: Geometry, L: Lights>(
+/// Light that arrives at `p`, in a medium or at the front of the surface at `hit`; `choice` picks the light and `u` the place on it.
+pub fn sample<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     p: Vec3,
+    hit: Option<&SurfaceHit>,
     choice: f32,
     u: [f32; 2],
 ) -> Option<DirectSample> {
-    sample(world, p, None, choice, u)
-}
-
-/// Light that arrives at the front of the surface at `hit`.
-pub fn on_surface<G: Geometry, L: Lights>(
-    world: &World<'_, G, L>,
-    hit: &SurfaceHit,
-    choice: f32,
-    u: [f32; 2],
-) -> Option<DirectSample> {
-    sample(world, hit.position, Some(hit), choice, u)
+    let chosen = light_choice(world, p, hit).sample(choice)?;
+    towards(world, p, hit, chosen, u)
 }
 
 /// Numbers for all lights: one chooses a lamp, two a place on it, two a direction to the sky.
@@ -55,7 +46,7 @@ pub(crate) fn from_all<G: Geometry, L: Lights>(
     lamp.into_iter().chain(sky(world, p, hit, to_sky))
 }
 
-/// As [`in_medium`] without a surface and as [`on_surface`] on one, but for skies and environment images: see [`sky`].
+/// As [`sample`], but for skies and environment images: see [`sky`].
 pub fn lamps<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     p: Vec3,
@@ -68,7 +59,10 @@ pub fn lamps<G: Geometry, L: Lights>(
         return sample(world, p, hit, choice, u);
     }
     let (light, chance) = light_choice(world, p, hit).without(skies).sample(choice)?;
-    (!skies.contains(&light)).then(|| towards(world, p, hit, (light, chance), u))?
+    if skies.contains(&light) {
+        return None;
+    }
+    towards(world, p, hit, (light, chance), u)
 }
 
 /// Light that arrives from skies and environment images at `p`, in a medium or on the surface at `hit`: the sum of the samples is an
@@ -81,25 +75,13 @@ pub fn sky<G: Geometry, L: Lights>(
 ) -> impl Iterator<Item = DirectSample> {
     let spread = move |k: u32| {
         let u = (u + k as f32 / SKY_SAMPLES as f32).fract();
-        [u, (v + k as f32 * INVERSE_GOLDEN_RATIO).fract()]
+        [u, (v + k as f32 * INVERSE_GOLDEN_RATIO as f32).fract()]
     };
     let skies = world.lights.environment().iter();
     skies.flat_map(move |&light| {
         let chance = SKY_SAMPLES as f32;
         (0..SKY_SAMPLES).filter_map(move |k| towards(world, p, hit, (light, chance), spread(k)))
     })
-}
-
-/// As [`in_medium`] without a surface and as [`on_surface`] on one.
-pub fn sample<G: Geometry, L: Lights>(
-    world: &World<'_, G, L>,
-    p: Vec3,
-    hit: Option<&SurfaceHit>,
-    choice: f32,
-    u: [f32; 2],
-) -> Option<DirectSample> {
-    let chosen = light_choice(world, p, hit).sample(choice)?;
-    towards(world, p, hit, chosen, u)
 }
 
 fn light_choice<'w, G, L: Lights>(

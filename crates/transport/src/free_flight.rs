@@ -3,7 +3,9 @@
 //! A channel is picked by the path's throughput and the density is the mixture over channels (spectral multiple
 //! importance sampling, Wilkie et al. 2014), so coloured extinction costs no variance in the channels not picked.
 
+use crate::world::{Geometry, SurfaceHit, World};
 use glam::Vec3;
+use tyndall_math::Ray;
 use tyndall_media::{Segment, absorptance, transmittance};
 
 /// Samples scattering distances on a [`Segment`] in proportion to σt T.
@@ -49,6 +51,16 @@ impl<'m> FreeFlight<'m> {
             stopped: absorptance(total),
             segment,
         }
+    }
+
+    /// The surface that `ray` meets, and flights up to it of a path that all channels follow alike.
+    pub fn to_surface<G: Geometry, L>(
+        world: &World<'m, G, L>,
+        ray: &Ray,
+    ) -> (Option<SurfaceHit>, Self) {
+        let hit = world.geometry.intersect(ray, f32::INFINITY);
+        let t_max = hit.map_or(f32::INFINITY, |hit| hit.t);
+        (hit, Self::new(world.media.segment(ray, t_max), Vec3::ONE))
     }
 
     /// The segment flown along.

@@ -5,7 +5,9 @@
 
 use crate::lamp_directions::LampDirections;
 use crate::occlusion::{self, Seen};
-use crate::path::{FirstEvent, Reach, Source, Start, Vertex, Visitor, lamps_in_fog, trace};
+use crate::path::{
+    FirstEvent, Reach, Source, Start, Vertex, Visitor, lamps_in_fog, straight_from_sky, trace,
+};
 use crate::walls::Walls;
 use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, World};
@@ -14,7 +16,7 @@ use std::f32::consts::{PI, TAU};
 use std::sync::OnceLock;
 use tyndall_math::spherical::{Border, SphericalVoronoi};
 use tyndall_math::{Key, Ray, Sampler, SphericalFibonacci, warp};
-use tyndall_media::{MediumPoint, transmittance};
+use tyndall_media::MediumPoint;
 
 /// Batches over which standard errors are taken. Paths are independent between them, directions are parts of one set: where the noise of
 /// paths is what counts the errors told are those found, and where light differs by direction alone they are overstated, at 1024
@@ -407,22 +409,6 @@ fn gather<'m, G: Geometry, L: Lights>(
     }
 }
 
-/// Tells `visitor` the light that comes straight along the first stretch of a path from skies and environment images.
-pub(crate) fn straight_from_sky<G, L: Lights>(
-    world: &World<'_, G, L>,
-    start: &Start<'_>,
-    visitor: &mut WarpVisitor<'_>,
-) {
-    if let Some(None) = start.hit {
-        let w_i = start.ray.direction;
-        let tau = world.media.optical_depth(&start.ray, f32::INFINITY);
-        for &light in world.lights.environment() {
-            let radiance = world.lights.environment_radiance(light, w_i);
-            visitor.light(transmittance(tau) * radiance, None, Source::Far(w_i));
-        }
-    }
-}
-
 /// Three numbers in [0, 1) that choose a rotation.
 fn random_rotation(sampler: &mut Sampler) -> [f32; 3] {
     let [u, v] = sampler.next_2d();
@@ -450,15 +436,8 @@ pub fn one_of<G: Geometry, L: Lights>(
     sampler: &mut Sampler,
 ) -> Vec3 {
     let direction = directions.sample(sampler.next_2d());
-    let start = Start {
-        ray: Ray::new(x, direction.w_i),
-        hit: None,
-        first: FirstEvent::Any,
-        reach: reach.behind_one(),
-    };
-    let mut visitor = ScatteredLight::default();
-    trace(world, &start, sampler, &mut visitor);
-    visitor.value * direction.weight
+    let ray = Ray::new(x, direction.w_i);
+    along(world, ray, false, reach, sampler) * direction.weight
 }
 
 /// Light that arrives along `ray` at its origin by one path; straight from skies if `sky`, and from no other emitter.

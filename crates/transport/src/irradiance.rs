@@ -3,8 +3,8 @@
 //! Directions by the cosine start paths. Light straight from emitters is left out, because it is sampled where it is needed, but that of
 //! even skies: few of all directions may lead there.
 
-use crate::gather::{BATCHES, Batches, Gathered, batch_key, straight_from_sky, warp_radius};
-use crate::path::{FirstEvent, Reach, Start, trace};
+use crate::gather::{BATCHES, Batches, Gathered, batch_key, warp_radius};
+use crate::path::{FirstEvent, Reach, Start, straight_from_sky, trace};
 use crate::walls::Walls;
 use crate::warp_translation::WarpVisitor;
 use crate::world::{Geometry, Lights, SurfaceHit, World};

@@ -12,7 +12,7 @@ use crate::single::{DensityAt, SegmentLight, unoccluded};
 use crate::world::{Geometry, LightSample, Lights, SurfaceHit, World};
 use glam::Vec3;
 use tyndall_math::{Ray, Sampler};
-use tyndall_media::MediumPoint;
+use tyndall_media::{MediumPoint, transmittance};
 
 /// Sets of four sample dimensions each stretch of a path owns; the camera owns the first.
 const SETS_PER_STRETCH: u32 = 3;
@@ -350,6 +350,18 @@ fn seen_environment<G: Geometry, L: Lights>(
             None,
             Source::Far(ray.direction),
         );
+    }
+}
+
+/// Tells `visitor` the light that comes straight along the first stretch of a path from skies and environment images.
+pub(crate) fn straight_from_sky<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    start: &Start<'_>,
+    visitor: &mut impl Visitor,
+) {
+    if let Some(None) = start.hit {
+        let tau = world.media.optical_depth(&start.ray, f32::INFINITY);
+        seen_environment(world, &start.ray, transmittance(tau), &Rival::None, visitor);
     }
 }
 

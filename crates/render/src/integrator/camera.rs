@@ -158,9 +158,7 @@ impl<'s> Camera<'s> {
     pub(crate) fn cached(&self, x: u32, y: u32, sampler: &mut Sampler, known: &Known<'_>) -> Pixel {
         let world = self.geometry.world(self.scene);
         let ray = self.ray(x, y, sampler);
-        let hit = world.geometry.intersect(&ray, f32::INFINITY);
-        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
-        let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+        let (hit, flight) = FreeFlight::to_surface(&world, &ray);
         let mut pixel = Pixel {
             surface: self.surface(&world, (&ray, hit), &flight, known, sampler),
             transmittance: flight.transmittance(),
@@ -185,12 +183,8 @@ impl<'s> Camera<'s> {
             match known.multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    let read = |x, t, path: &mut Sampler| {
-                        self.read(cache, (x, t), path, |path| {
-                            gather::one(&world, x, self.reach, path)
-                        })
-                    };
-                    pixel.multiple = self.scattered(&ray, &flight, sampler, read);
+                    let trace = |x, path: &mut Sampler| gather::one(&world, x, self.reach, path);
+                    pixel.multiple = self.interpolated(&ray, &flight, cache, sampler, trace);
                 }
                 Multiple::Field(field) => {
                     let read = |x, _, path: &mut Sampler| {
@@ -216,18 +210,13 @@ impl<'s> Camera<'s> {
             return Vec3::ZERO;
         }
         let ray = self.ray(x, y, sampler);
-        let hit = world.geometry.intersect(&ray, f32::INFINITY);
-        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
-        let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+        let (_, flight) = FreeFlight::to_surface(&world, &ray);
         if !flight.can_stop() {
             return Vec3::ZERO;
         }
-        self.scattered(
-            &ray,
-            &flight,
-            &mut sampler.branch(FOG_PART),
-            |x, _, sampler| from_sky(&world, x, sampler),
-        )
+        let sampler = &mut sampler.branch(FOG_PART);
+        let read = |x, _, sampler: &mut Sampler| from_sky(&world, x, sampler);
+        self.scattered(&ray, &flight, sampler, read)
     }
 
     /// What the first surface sends to the eye, or the environment.
@@ -323,12 +312,8 @@ impl<'s> Camera<'s> {
     ) -> Vec3 {
         if let Some(cache) = known.single {
             let sampler = &mut sampler.branch(SINGLE_PART);
-            let read = |x, t, sampler: &mut Sampler| {
-                self.read(cache, (x, t), sampler, |sampler| {
-                    from_lights(world, x, sampler)
-                })
-            };
-            return self.scattered(ray, flight, sampler, read);
+            let trace = |x, sampler: &mut Sampler| from_lights(world, x, sampler);
+            return self.interpolated(ray, flight, cache, sampler, trace);
         }
         let Some(mut lights) = SegmentLight::new(world, ray, flight) else {
             return Vec3::ZERO;
@@ -337,12 +322,8 @@ impl<'s> Camera<'s> {
         if let Some(cache) = known.sky {
             lights.take_sky(world.lights);
             let sampler = &mut sampler.branch(SKY_PART);
-            let read = |x, t, sampler: &mut Sampler| {
-                self.read(cache, (x, t), sampler, |sampler| {
-                    from_sky(world, x, sampler)
-                })
-            };
-            shafts += self.scattered(ray, flight, sampler, read);
+            let trace = |x, sampler: &mut Sampler| from_sky(world, x, sampler);
+            shafts += self.interpolated(ray, flight, cache, sampler, trace);
         }
         for (light, probes) in lights.take_shafts(world.lights, SHAFT_PROBES) {
             let shaft = Shafts::new(world, ray, flight, light);
@@ -388,19 +369,22 @@ impl<'s> Camera<'s> {
         sum / MEDIA_SAMPLES as f32
     }
 
-    /// What `cache` knows of light at `x`, which is `t` metres from the eye; where it knows nothing, what `trace` finds.
-    fn read(
+    /// As [`Camera::scattered`], of what `cache` knows; at a place where it knows nothing, of what `trace` finds.
+    fn interpolated(
         &self,
+        ray: &Ray,
+        flight: &FreeFlight<'_>,
         cache: &MediaCache,
-        (x, t): (Vec3, f32),
         sampler: &mut Sampler,
-        trace: impl Fn(&mut Sampler) -> Vec3,
+        trace: impl Fn(Vec3, &mut Sampler) -> Vec3,
     ) -> Vec3 {
-        self.lookups.set(self.lookups.get() + 1);
-        media::lookup(cache, x).unwrap_or_else(|| {
-            self.missed.set(self.missed.get() + 1);
-            // The nearest record is a little off here, and a path would be noisy.
-            media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| trace(sampler))
+        self.scattered(ray, flight, sampler, |x, t, sampler| {
+            self.lookups.set(self.lookups.get() + 1);
+            media::lookup(cache, x).unwrap_or_else(|| {
+                self.missed.set(self.missed.get() + 1);
+                // The nearest record is a little off here, and a path would be noisy.
+                media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| trace(x, sampler))
+            })
         })
     }
 }
@@ -408,7 +392,7 @@ impl<'s> Camera<'s> {
 /// In-scattered radiance at `x` of light straight from all lights, where media scatter alike in all directions.
 fn from_lights(world: &World<'_, Counted<'_>, LightSet>, x: Vec3, sampler: &mut Sampler) -> Vec3 {
     let (choice, u) = (sampler.next_1d(), sampler.next_2d());
-    let sample = direct::in_medium(world, x, choice, u);
+    let sample = direct::sample(world, x, None, choice, u);
     sample.map_or(Vec3::ZERO, |s| s.radiance) * (0.25 * FRAC_1_PI)
 }
 

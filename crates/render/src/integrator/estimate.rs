@@ -4,6 +4,7 @@
 //! truth: (x − r1)(x − r2) w has the squared error of x as its mean, however noisy r1 and r2 are.
 
 use super::camera::{Camera, Tally};
+use super::has_passed;
 use crate::film::Film;
 use crate::options::{Phase, Progress};
 use crate::relative::{mean, median_5x5, weighted, weights};
@@ -65,7 +66,7 @@ impl Estimate<'_> {
         let terms: Vec<Option<Term>> = (0..pixels)
             .into_par_iter()
             .map(|i| {
-                if self.deadline.is_some_and(|d| Instant::now() >= d) {
+                if has_passed(self.deadline) {
                     return None;
                 }
                 let pixel = self.pixel(i, pixels, width * height);

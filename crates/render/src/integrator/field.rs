@@ -4,6 +4,7 @@
 //! the field does not depend on the number of threads.
 
 use super::counted::Counted;
+use super::has_passed;
 use crate::options::{Phase, Progress};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -101,7 +102,7 @@ pub(super) fn fill(
         }
         first = last;
         held += found.len() as u64;
-        cut_short = deadline.is_some_and(|d| Instant::now() >= d);
+        cut_short = has_passed(deadline);
         progress.update(Phase::Fill, (0.2 * held as f32 / wanted as f32).min(0.2), 0);
     }
     let mut field = filling.end(&counted);

@@ -6,18 +6,18 @@
 use super::counted::Counted;
 use super::fill::media::{self, MediaCache};
 use super::fill::surfaces::{self, SurfaceCache};
-use super::pilot::Pilot;
+use super::has_passed;
+use super::pilot::{self, Pilot};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::time::Instant;
-use tyndall_math::{Key, Purpose, Ray, Sampler};
+use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::Scene;
 use tyndall_transport::field::{Field, Part};
 use tyndall_transport::free_flight::FreeFlight;
 use tyndall_transport::gather::{self, GatherPattern};
 use tyndall_transport::irradiance::irradiance;
 use tyndall_transport::path::Reach;
-use tyndall_transport::world::Geometry;
 
 /// One of so many blocks of the pilot is looked at; no divisor of a row's blocks, so that all columns have their turn.
 const EVERY: usize = 5;
@@ -64,7 +64,7 @@ impl HeldOut<'_> {
         let blocks: Vec<usize> = (0..self.pilot.len()).step_by(EVERY).collect();
         let squared: Option<f64> = (blocks.par_iter())
             .map(|&block| {
-                if self.deadline.is_some_and(|d| Instant::now() >= d) {
+                if has_passed(self.deadline) {
                     return None;
                 }
                 let found = self.difference(&geometry, read, block, &pattern);
@@ -93,12 +93,10 @@ impl HeldOut<'_> {
             index: HELD_OUT + KEYS * block as u64 + k,
         };
         let mut sampler = Sampler::new(key(0), 0);
-        let [x, y] = self.pilot.place(block, sampler.next_2d());
+        let [x, y] = pilot::place(block as u32, sampler.next_2d());
         let [w, h] = self.frame;
-        let ray: Ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
-        let hit = world.geometry.intersect(&ray, f32::INFINITY);
-        let t_max = hit.map_or(f32::INFINITY, |h| h.t);
-        let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+        let ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
+        let (hit, flight) = FreeFlight::to_surface(&world, &ray);
         if let Read::Surface(cache, sky) = read {
             let hit = hit.filter(surfaces::holds)?;
             let known = surfaces::lookup(cache, hit.position, hit.bsdf.normal())?;

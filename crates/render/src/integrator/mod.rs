@@ -146,8 +146,7 @@ impl<'s> Run<'s> {
     }
 
     fn out_of_time(&self) -> bool {
-        self.deadline(RENDER_DEADLINE)
-            .is_some_and(|d| Instant::now() >= d)
+        has_passed(self.deadline(RENDER_DEADLINE))
     }
 
     fn render(&self) -> Result<Outcome, RenderError> {
@@ -167,7 +166,7 @@ impl<'s> Run<'s> {
         stats.fill_s = self.start.elapsed().as_secs_f64();
 
         let rendering = Instant::now();
-        let reach = prepared.reach(self.max_depth);
+        let reach = self.reach(prepared.field.as_ref());
         let target = self.noise_target(&prepared);
         let known = prepared.known(way);
         let (tally, timed_out) = self.sample(&mut film, target, &known, reach);
@@ -310,7 +309,6 @@ impl<'s> Run<'s> {
     /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
     fn has_field(&self, way: Way) -> bool {
         way != Way::PathIntegrator
-            && !self.is_jarosz08()
             && self.is_lit()
             && self.max_depth.is_none()
             && self.scene.media.is_isotropic()
@@ -328,6 +326,14 @@ impl<'s> Run<'s> {
             && self.max_depth.is_none()
             && self.scene.lights.has_even_skies()
             && !self.scene.geometry.is_empty()
+    }
+
+    /// How far paths go that may end in a field.
+    fn reach<'f>(&self, field: Option<&'f FilledField>) -> Reach<'f> {
+        Reach {
+            max_depth: self.max_depth,
+            field: field.map(|filled| &filled.field),
+        }
     }
 
     fn field(&self) -> FilledField {
@@ -504,6 +510,11 @@ impl<'s> Run<'s> {
         };
         (pass, samples)
     }
+}
+
+/// Whether there is a deadline, and it is over.
+fn has_passed(deadline: Option<Instant>) -> bool {
+    deadline.is_some_and(|d| Instant::now() >= d)
 }
 
 /// Says that what was computed ahead errs more than the image may, and which part of it most.

@@ -3,6 +3,7 @@
 //! From them follows how far each part of the light may be off ([`Plan`]): what adds little to a pixel may be known less well.
 
 use super::camera::{Camera, Known};
+use super::has_passed;
 use crate::film::Pixel;
 use crate::options::SingleFrom;
 use glam::{DVec3, Vec3};
@@ -80,7 +81,7 @@ impl Pilot {
         let found: Vec<(Block, u64)> = (0..BLOCKS[0] * BLOCKS[1])
             .into_par_iter()
             .map(|block| {
-                if deadline.is_some_and(|d| Instant::now() >= d) {
+                if has_passed(deadline) {
                     return (Block::default(), 0);
                 }
                 let camera = camera();
@@ -100,11 +101,6 @@ impl Pilot {
     /// Number of blocks.
     pub(super) fn len(&self) -> usize {
         self.blocks.len()
-    }
-
-    /// A place in a block, in shares of the frame from its upper left corner, for two numbers in [0, 1).
-    pub(super) fn place(&self, block: usize, u: [f32; 2]) -> [f32; 2] {
-        place(block as u32, u)
     }
 
     /// The weight of a squared difference in a block, in the relative error of the image; 0 where all is black.
@@ -147,8 +143,8 @@ fn beauty(p: &Pixel) -> Vec3 {
     p.surface + p.single + p.multiple + p.emission
 }
 
-/// See [`Pilot::place`].
-fn place(block: u32, [u, v]: [f32; 2]) -> [f32; 2] {
+/// A place in a block, in shares of the frame from its upper left corner, for two numbers in [0, 1).
+pub(super) fn place(block: u32, [u, v]: [f32; 2]) -> [f32; 2] {
     let [columns, rows] = BLOCKS.map(|n| n as f32);
     let column = (block % BLOCKS[0]) as f32 + u;
     let row = (block / BLOCKS[0]) as f32 + v;

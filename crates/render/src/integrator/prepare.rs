@@ -10,11 +10,10 @@ use super::fill::surfaces::{Side, Surfaces};
 use super::held_out::{HeldOut, Read};
 use super::pilot::{Pilot, Plan};
 use super::record_map::RecordMap;
-use super::{FILL_DEADLINE, Run, Way};
+use super::{FILL_DEADLINE, Run, Way, has_passed};
 use crate::image::Image;
 use crate::options::{Crop, MultipleFrom};
 use crate::stats::Stats;
-use std::time::Instant;
 use tyndall_transport::path::Reach;
 use tyndall_transport::walls::Walls;
 
@@ -39,13 +38,6 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    pub(super) fn reach(&self, max_depth: Option<u32>) -> Reach<'_> {
-        Reach {
-            max_depth,
-            field: self.field.as_ref().map(|filled| &filled.field),
-        }
-    }
-
     /// What camera samples read.
     pub(super) fn known(&self, way: Way) -> Known<'_> {
         let field = self.field.as_ref().map(|filled| &filled.field);
@@ -128,27 +120,19 @@ impl Run<'_> {
         if self.is_jarosz08() {
             return self.jarosz08(way);
         }
-        let mut prepared = Prepared {
-            field: self.has_field(way).then(|| self.field()),
-            ..Prepared::default()
-        };
         let holds_surfaces = self.has_surface_records(way);
-        let may_hold_sky = self.may_hold_sky(way);
-        if way != Way::Records && !holds_surfaces && !may_hold_sky {
-            return prepared;
+        if way != Way::Records && !holds_surfaces {
+            return Prepared::default();
         }
-        let seed = self.options.seed;
-        let field = prepared.field.take();
-        let reach = Reach {
-            max_depth: self.max_depth,
-            field: field.as_ref().map(|filled| &filled.field),
-        };
+        let mut prepared = Prepared::default();
+        let field = self.has_field(way).then(|| self.field());
+        let reach = self.reach(field.as_ref());
         let pilot = self.pilot(way, reach);
         let plan = pilot.plan(self.error);
         let held_out = HeldOut {
             scene: self.scene,
             frame: self.frame,
-            seed,
+            seed: self.options.seed,
             reach,
             pilot: &pilot,
             deadline: self.deadline(FILL_DEADLINE),
@@ -159,7 +143,6 @@ impl Run<'_> {
             rays += more;
             error
         };
-        let mut shares = Vec::new();
         if way == Way::Records {
             let kind = self.media(Holds::Multiple(reach), plan.multiple);
             let in_field = reach
@@ -178,13 +161,16 @@ impl Run<'_> {
                 prepared.multiple = Some(filled);
                 error
             };
-            shares.push(("multiple", error));
+            prepared.shares.push(("multiple", error));
         }
-        if let Some(error) = plan.sky(self.options.single).filter(|_| may_hold_sky) {
+        if let Some(error) = plan.sky(self.options.single)
+            && self.may_hold_sky(way)
+        {
             let kind = self.media(Holds::Sky, error);
             let n_rays = kind.n_rays();
             let filled = self.fill(kind);
-            shares.push(("single", check(Read::Sky(&filled.cache), n_rays)));
+            let error = check(Read::Sky(&filled.cache), n_rays);
+            prepared.shares.push(("single", error));
             prepared.sky = Some(filled);
         }
         if holds_surfaces {
@@ -192,20 +178,17 @@ impl Run<'_> {
                 scene: self.scene,
                 frame: self.frame,
                 reach,
-                seed,
+                seed: self.options.seed,
                 sky: prepared.sky.is_some(),
                 error: plan.surface,
             };
             let (n_rays, sky) = (kind.n_rays(), kind.sky);
             let filled = self.fill(kind);
-            let read = Read::Surface(&filled.cache, sky);
-            shares.push(("surface", check(read, n_rays)));
+            let error = check(Read::Surface(&filled.cache, sky), n_rays);
+            prepared.shares.push(("surface", error));
             prepared.surface = Some(filled);
         }
-        prepared.shares = shares;
-        prepared.deadline_passed = self
-            .deadline(FILL_DEADLINE)
-            .is_some_and(|d| Instant::now() >= d);
+        prepared.deadline_passed = has_passed(self.deadline(FILL_DEADLINE));
         prepared.rays = rays;
         prepared.field = field;
         prepared

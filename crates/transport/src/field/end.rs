@@ -25,7 +25,7 @@ fn traced<G: Geometry, L: Lights>(
     let mut sampler = sampler.branch(UNKNOWN);
     let direct = match part {
         Part::Indirect => None,
-        Part::All => direct::in_medium(world, x, sampler.next_1d(), sampler.next_2d()),
+        Part::All => direct::sample(world, x, None, sampler.next_1d(), sampler.next_2d()),
     };
     // Fields are for media that scatter alike in all directions.
     let direct = direct.map_or(Vec3::ZERO, |s| s.radiance * (0.25 * FRAC_1_PI));
@@ -105,7 +105,8 @@ impl Field {
                 Source::Scattered([Vec3::ZERO; 3]),
             );
             if part == Part::Indirect
-                && let Some(s) = direct::on_surface(world, hit, choice, sampler.next_2d())
+                && let Some(s) =
+                    direct::sample(world, hit.position, Some(hit), choice, sampler.next_2d())
             {
                 let value = arrives * hit.bsdf.eval(-ray.direction, s.w_i) * s.radiance;
                 tell(value, vertex, source(hit.position, &s.light));

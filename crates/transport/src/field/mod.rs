@@ -268,6 +268,20 @@ impl Asked {
 }
 
 impl Field {
+    /// The field of what walks `found`, computed by one thread; for many there is [`Filling`].
+    pub fn new<G: Geometry>(geometry: &G, widths: CellWidths, found: &[Found]) -> Self {
+        let mut filling = Filling::new(widths);
+        let cells = filling.place(found);
+        for (found, &cell) in found.iter().zip(&cells) {
+            let side = filling.side(geometry, cell, found);
+            filling.add(geometry, cell, side, found);
+        }
+        let mut field = filling.end(geometry);
+        let seen = (0..field.len()).map(|cell| field.surroundings_of(geometry, cell));
+        field.set_surroundings(seen.collect());
+        field
+    }
+
     /// Number of cells of all sizes, each side of one that surfaces part counted by itself.
     pub fn len(&self) -> usize {
         self.light.len()

@@ -3,7 +3,7 @@
 use super::{Cone, LightBounds};
 use tyndall_math::Aabb;
 
-/// Neither part holds less than this share of the lights: the tree's depth is bounded by the logarithm of their number.
+/// Neither part holds less than one in so many lights: the tree's depth is bounded by the logarithm of their number.
 const LEAST_PART: usize = 8;
 /// Share of the cost that does not shrink with the extent of a part: tells apart which way lights at one place shine.
 const SIZELESS: f32 = 0.01;
@@ -35,8 +35,8 @@ impl Extent {
         }
     }
 
-    /// How badly its lights are judged as one: intensity × solid angle × diagonal², the diagonal as a share of the whole's. After
-    /// Conty Estevez and Kulla 2018, section 4.4.
+    /// How badly its lights are judged as one: intensity × solid angle × diagonal², the diagonal as a share of the whole's. It is
+    /// the surface area orientation heuristic of Conty Estevez and Kulla 2018, but for their bound of the emission.
     fn cost(&self, whole: f32) -> f32 {
         let size = self.bounds.diagonal() / whole.max(f32::MIN_POSITIVE);
         let solid_angle = self.cone.map_or(0.0, Cone::solid_angle);

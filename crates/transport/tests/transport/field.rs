@@ -34,7 +34,6 @@ fn fields<G: Geometry>(
         purpose: Purpose::Field,
         index: 0,
     };
-    let mut filling = Filling::new(widths);
     let mut found = Vec::new();
     for walk in 0..walks {
         for &x in places {
@@ -43,15 +42,7 @@ fn fields<G: Geometry>(
             Filling::walk(world, ray, &mut sampler, &mut found);
         }
     }
-    let cells = filling.place(&found);
-    for (&cell, found) in cells.iter().zip(&found) {
-        let side = filling.side(world.geometry, cell, found);
-        filling.add(world.geometry, cell, side, found);
-    }
-    let mut field = filling.end(world.geometry);
-    let seen = (0..field.len()).map(|cell| field.surroundings_of(world.geometry, cell));
-    field.set_surroundings(seen.collect());
-    field
+    Field::new(world.geometry, widths, &found)
 }
 
 #[test]

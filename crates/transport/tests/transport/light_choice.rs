@@ -3,25 +3,16 @@
 use crate::rig::Lamps;
 use glam::Vec3;
 use tyndall_math::stats::chi_square_test;
-use tyndall_math::testing::FALSE_ALARM_RATE;
-use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
+use tyndall_math::testing::{FALSE_ALARM_RATE, sampler};
+use tyndall_math::{Ray, warp};
 use tyndall_transport::Lights;
 use tyndall_transport::light_choice::LightChoice;
-
-fn random(seed: u64, index: u64) -> Sampler {
-    let key = Key {
-        seed,
-        purpose: Purpose::Probe,
-        index,
-    };
-    Sampler::new(key, 0)
-}
 
 /// Lamps in heaps: some at one place, some dark, and of very different intensity.
 fn heaps(n: usize, seed: u64) -> Lamps {
     let mut points: Vec<(Vec3, f32)> = Vec::new();
     for i in 0..n {
-        let mut random = random(seed, i as u64);
+        let mut random = sampler(seed, i as u64);
         let [kind, intensity] = random.next_2d();
         let place = match points.last() {
             Some(&(last, _)) if kind < 0.3 => last,
@@ -40,7 +31,7 @@ fn heaps(n: usize, seed: u64) -> Lamps {
 
 /// Choices at and along places among `lights`, one of them at a lamp.
 fn choices(lights: &Lamps, seed: u64) -> Vec<LightChoice<'_>> {
-    let mut random = random(seed, 0);
+    let mut random = sampler(seed, 0);
     let p = 10.0 * warp::uniform_sphere(random.next_2d());
     let ray = Ray::new(p, warp::uniform_sphere(random.next_2d()));
     let lamp = lights.pivot(0).unwrap_or(p);
@@ -116,7 +107,7 @@ fn lights_are_chosen_with_the_chance_that_is_told() {
             let n = 200_000;
             let mut counts = vec![0_u64; lights.count()];
             for sample in 0..n {
-                let u = random(400 + i as u64, sample).next_1d();
+                let u = sampler(400 + i as u64, sample).next_1d();
                 counts[choice.sample(u).unwrap().0] += 1;
             }
             let expected: Vec<f64> = (0..lights.count())

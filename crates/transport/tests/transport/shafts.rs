@@ -4,7 +4,8 @@ use crate::rig::{Estimate, Lamps, fog};
 use crate::stage::{Card, Stage};
 use glam::Vec3;
 use std::f64::consts::PI;
-use tyndall_math::{Key, Purpose, Ray, Sampler};
+use tyndall_math::Ray;
+use tyndall_math::testing::sampler;
 use tyndall_media::{Media, Medium, MediumParams, PhaseFunction, Region};
 use tyndall_transport::free_flight::FreeFlight;
 use tyndall_transport::shafts::Shafts;
@@ -94,15 +95,6 @@ fn exact((t, end): (f64, f64), sin: f64) -> f64 {
     let depth = (-sigma * f64::from(TOP)).exp();
     f64::from(ALBEDO) * sigma / (4.0 * PI) * depth * ((-slope * t).exp() - (-slope * end).exp())
         / slope
-}
-
-fn sampler(seed: u64, index: u64) -> Sampler {
-    let key = Key {
-        seed,
-        purpose: Purpose::Probe,
-        index,
-    };
-    Sampler::new(key, 0)
 }
 
 /// Mean over random offsets of `n` probes along a ray of [`LENGTH`] from the origin.

@@ -6,13 +6,13 @@
 //! are blended as `tyndall-cache` does it.
 
 use super::surfaces::{Side, SurfaceCache, Surfaces};
-use super::{Candidate, Counted, Kind, media, record, surfaces};
+use super::{Candidate, Counted, Kind, Light, media, record, surfaces};
 use glam::Vec3;
 use tyndall_cache::Record;
-use tyndall_math::{Key, Purpose, Ray};
+use tyndall_math::Ray;
 use tyndall_scene::Scene;
-use tyndall_transport::gather::{self, Derivatives, GatherPattern, Gathered};
-use tyndall_transport::inscatter::{self, Inscattered};
+use tyndall_transport::gather::{self, Derivatives, GatherPattern};
+use tyndall_transport::inscatter;
 use tyndall_transport::irradiance::irradiance;
 use tyndall_transport::path::Reach;
 use tyndall_transport::walls::Walls;
@@ -34,9 +34,6 @@ const LEAST_FOOTPRINT: f32 = 1.5;
 /// Largest radius as a share of the height that the camera sees there. Alone it bounds records in even light, which reach into shadows: with
 /// 0.25 the hall at 0.05 was 32 % off, with 0.1 22 % (2026-11-22).
 const MOST_HEIGHT: f32 = 0.125;
-/// Keeps the random numbers of records of single scattering, and of those on surfaces, from those of multiple scattering.
-const SINGLE: u64 = 1 << 41;
-const SURFACE: u64 = 1 << 40;
 
 /// Samples of a record at a target `error` of the image.
 fn samples(gain: f32, error: f32) -> usize {
@@ -44,59 +41,32 @@ fn samples(gain: f32, error: f32) -> usize {
     (gain / error).powi(2).clamp(fewest, most) as usize
 }
 
-/// What a record is made of.
-struct Found {
-    value: Vec3,
-    value_error: Vec3,
+/// The record of what samples at a point found, valid within the paper's radius in metres:
+///
+/// R = ε Σ L / Σ ‖∇L‖
+///
+/// * ε – `tolerance`;
+/// * Σ – sums over the samples and channels; gradients that point against each other do not cancel.
+///
+/// Where no light was found there is no telling where light begins: the radius is the smallest. `height` is that of the frame in pixels.
+fn record_as_published(
+    candidate: &Candidate,
+    (height, tolerance): (u32, f32),
+    value: (Vec3, Vec3),
     gradient: [Vec3; 3],
     gradient_norm: f32,
-}
-
-impl From<Inscattered> for Found {
-    fn from(found: Inscattered) -> Self {
-        Self {
-            value: found.value,
-            value_error: found.value_error,
-            gradient: found.gradient,
-            gradient_norm: found.gradient_norm,
-        }
-    }
-}
-
-impl From<Gathered> for Found {
-    fn from(found: Gathered) -> Self {
-        Self {
-            value: found.value,
-            value_error: found.value_error,
-            gradient: found.gradient,
-            gradient_norm: found.gradient_norm,
-        }
-    }
-}
-
-impl Found {
-    /// The record at a point, valid within the paper's radius in metres:
-    ///
-    /// R = ε Σ L / Σ ‖∇L‖
-    ///
-    /// * ε – `tolerance`;
-    /// * Σ – sums over the samples and channels; gradients that point against each other do not cancel.
-    ///
-    /// Where no light was found there is no telling where light begins: the radius is the smallest.
-    fn record(&self, candidate: &Candidate, height: u32, tolerance: f32) -> Option<Record<3>> {
-        let light = self.value.element_sum();
-        let radius = if light > 0.0 {
-            tolerance * light / self.gradient_norm
-        } else {
-            0.0
-        };
-        let radius = radius.clamp(
-            LEAST_FOOTPRINT * candidate.footprint,
-            most_radius(candidate, height),
-        );
-        let value = (self.value, self.value_error);
-        record(candidate.position, radius, value, self.gradient)
-    }
+) -> Option<Record<3>> {
+    let light = value.0.element_sum();
+    let radius = if light > 0.0 {
+        tolerance * light / gradient_norm
+    } else {
+        0.0
+    };
+    let radius = radius.clamp(
+        LEAST_FOOTPRINT * candidate.footprint,
+        most_radius(candidate, height),
+    );
+    record(candidate.position, radius, value, gradient)
 }
 
 /// Largest radius of records at a point, in a frame `height` pixels high.
@@ -183,23 +153,23 @@ impl Kind for Volume<'_> {
     ) -> Option<(Record<3>, Walls)> {
         let world = geometry.world(self.scene);
         let x = candidate.position;
-        let key = |index| Key {
-            seed: self.seed,
-            purpose: Purpose::Record,
-            index,
-        };
         let blind = Derivatives::Blind;
-        let found: Found = match &self.samples {
+        let (value, gradient, norm) = match &self.samples {
             Samples::Lights(n) => {
                 let derivatives = (inscatter::Order::Gradient, blind);
-                inscatter::single(&world, x, None, *n, derivatives, key(SINGLE | index)).into()
+                let key = Light::Single.key(self.seed, index);
+                let s = inscatter::single(&world, x, None, *n, derivatives, key);
+                ((s.value, s.value_error), s.gradient, s.gradient_norm)
             }
             Samples::Paths(pattern, max_depth) => {
                 let reach = Reach::depth(*max_depth);
-                gather::multiple_towards(&world, x, None, pattern, blind, reach, key(index)).into()
+                let key = Light::Multiple.key(self.seed, index);
+                let g = gather::multiple_towards(&world, x, None, pattern, blind, reach, key);
+                ((g.value, g.value_error), g.gradient, g.gradient_norm)
             }
         };
-        let record = found.record(candidate, self.frame[1], self.tolerance)?;
+        let limits = (self.frame[1], self.tolerance);
+        let record = record_as_published(candidate, limits, value, gradient, norm)?;
         Some((record, Walls::NONE))
     }
 }
@@ -240,16 +210,13 @@ impl Kind for Irradiance<'_> {
     ) -> Option<(Record<3>, Side)> {
         let world = geometry.world(self.scene);
         let hit = Surfaces::hit(geometry, &candidate.ray)?;
-        let key = Key {
-            seed: self.seed,
-            purpose: Purpose::Record,
-            index: SURFACE | index,
-        };
+        let key = Light::Surface.key(self.seed, index);
         let n_rays = samples(SURFACE_PATHS_GAIN, self.error);
         let reach = Reach::depth(self.max_depth);
-        let found: Found = irradiance(&world, &hit, n_rays, false, reach, key).into();
-        let tolerance = SURFACE_TOLERANCE * self.error.sqrt();
-        let record = found.record(candidate, self.frame[1], tolerance)?;
+        let g = irradiance(&world, &hit, n_rays, false, reach, key);
+        let limits = (self.frame[1], SURFACE_TOLERANCE * self.error.sqrt());
+        let value = (g.value, g.value_error);
+        let record = record_as_published(candidate, limits, value, g.gradient, g.gradient_norm)?;
         Some((record, Side::open(candidate.normal)))
     }
 }

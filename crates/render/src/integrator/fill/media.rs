@@ -3,11 +3,12 @@
 //! Their radii follow the lengths over which the field changes; none reaches past the walls around it.
 
 use super::{
-    ATTEMPTS, Candidate, Counted, Kind, MORE_RAYS, first_rays, quiet_enough, record, relative_slope,
+    ATTEMPTS, Candidate, Counted, Kind, Light, MORE_RAYS, first_rays, quiet_enough, record,
+    relative_slope,
 };
 use glam::Vec3;
 use tyndall_cache::{Cache, Record};
-use tyndall_math::{Key, Purpose, Ray, Sampler, warp};
+use tyndall_math::{Key, Ray, Sampler, warp};
 use tyndall_scene::Scene;
 use tyndall_transport::free_flight::FreeFlight;
 use tyndall_transport::gather::{self, GatherPattern};
@@ -24,8 +25,6 @@ const RADIUS_GAIN: f32 = 4.0;
 const RAYS_GAIN: f32 = 0.9;
 /// As [`RAYS_GAIN`] for light from skies, whose rays cost little and find it through windows alone.
 const SKY_RAYS_GAIN: f32 = 1.8;
-/// Keeps the random numbers of records of skies from those of multiple scattering.
-const SKY: u64 = 1 << 41;
 /// Smallest and largest radius as shares of the length over which the view looks into the fog.
 const RADIUS_RANGE: [f32; 2] = [0.01, 0.25];
 /// Smallest radius in pixels seen from the camera: detail below half a pixel is averaged away. A whole pixel was too much:
@@ -126,12 +125,7 @@ pub(super) fn points_on(
     offset: f32,
     mut visit: impl FnMut(Candidate),
 ) {
-    let world = scene.world();
-    let t_max = world
-        .geometry
-        .intersect(ray, f32::INFINITY)
-        .map_or(f32::INFINITY, |h| h.t);
-    let flight = FreeFlight::new(world.media.segment(ray, t_max), Vec3::ONE);
+    let (_, flight) = FreeFlight::to_surface(&scene.world(), ray);
     if !flight.can_stop() {
         return;
     }
@@ -177,14 +171,11 @@ impl Kind for Media<'_> {
         round: usize,
     ) -> Option<(Record<3>, Walls)> {
         let world = geometry.world(self.scene);
-        let key = Key {
-            seed: self.seed,
-            purpose: Purpose::Record,
-            index: match self.holds {
-                Holds::Multiple(_) => index,
-                Holds::Sky => SKY | index,
-            },
+        let light = match self.holds {
+            Holds::Multiple(_) => Light::Multiple,
+            Holds::Sky => Light::Single,
         };
+        let key = light.key(self.seed, index);
         // Moved, a record may miss the point that asked for it.
         let x = if round == 0 {
             clear_of_surfaces(&world, candidate.position, CLEARANCE * self.view, key)
@@ -232,11 +223,7 @@ fn view_length(scene: &Scene, [w, h]: [u32; 2]) -> f32 {
         for i in 0..8 {
             let (x, y) = ((i as f32 + 0.5) / 8.0, (j as f32 + 0.5) / 8.0);
             let ray = scene.camera.ray(x * w as f32, y * h as f32, w, h);
-            let t_max = world
-                .geometry
-                .intersect(&ray, f32::INFINITY)
-                .map_or(f32::INFINITY, |h| h.t);
-            let flight = FreeFlight::new(world.media.segment(&ray, t_max), Vec3::ONE);
+            let (_, flight) = FreeFlight::to_surface(&world, &ray);
             if flight.can_stop() {
                 let start = flight.segment().range().0;
                 if let Some(t) = flight.sample_inside(0.9) {

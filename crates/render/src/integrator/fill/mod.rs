@@ -8,6 +8,7 @@ pub(super) mod media;
 pub(super) mod surfaces;
 
 use super::counted::Counted;
+use super::has_passed;
 use crate::options::{Phase, Progress};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -38,6 +39,25 @@ const ATTEMPTS: usize = 2;
 /// The noise of a record over the error asked for with which no further attempt is made. Told errors are conservative, and about six
 /// records blend at a point.
 const NOISE: f32 = 4.0;
+
+/// Which light records hold; their random numbers are kept apart by it.
+#[derive(Clone, Copy)]
+enum Light {
+    Multiple,
+    Surface,
+    Single,
+}
+
+impl Light {
+    /// The random numbers of record number `index`.
+    fn key(self, seed: u64, index: u64) -> Key {
+        Key {
+            seed,
+            purpose: Purpose::Record,
+            index: (self as u64) << 40 | index,
+        }
+    }
+}
 
 /// The first of some attempts, with ever more rays, whose noise is small for a target `error` of the image; else the last.
 fn quiet_enough(error: f32, gather: impl Fn(usize) -> Gathered) -> Gathered {
@@ -237,7 +257,7 @@ impl<K: Kind> Fill<'_, K> {
     }
 
     fn out_of_time(&self) -> bool {
-        self.deadline.is_some_and(|d| Instant::now() >= d)
+        has_passed(self.deadline)
     }
 
     /// Points on the camera rays of one level that no record covers, in a fixed order, and their share of all points.

@@ -1,15 +1,16 @@
 //! Records of irradiance on surfaces, by indirect light and by even skies.
 //!
-//! They serve the diffuse part of rough surfaces; gloss, and what shines, is traced. Radii follow the harmonic mean distance to other surfaces (Ward et al. 1988).
+//! They serve the diffuse part of rough surfaces; gloss, and what shines, is traced. Radii follow the harmonic mean distance to other
+//! surfaces (Ward et al. 1988).
 
 use super::{
-    Candidate, Counted, Kind, MORE_RAYS, SAME_SURFACE, first_rays, quiet_enough, record,
+    Candidate, Counted, Kind, Light, MORE_RAYS, SAME_SURFACE, first_rays, quiet_enough, record,
     relative_slope,
 };
 use glam::Vec3;
 use std::cell::Cell;
 use tyndall_cache::{Cache, Record};
-use tyndall_math::{Key, Purpose, Ray};
+use tyndall_math::Ray;
 use tyndall_scene::Scene;
 use tyndall_transport::irradiance::irradiance;
 use tyndall_transport::path::Reach;
@@ -24,8 +25,6 @@ const RADIUS_GAIN: f32 = 2.0;
 const FOOTPRINTS: [f32; 2] = [1.5, 24.0];
 /// A record is not valid farther than this share of its radius above or below its plane.
 const THICKNESS: f32 = 0.2;
-/// Keeps the random numbers of records on surfaces from those of records in media.
-const SURFACE: u64 = 1 << 40;
 
 /// Where a record on a surface is valid.
 #[derive(Clone, Copy, Debug)]
@@ -142,11 +141,7 @@ impl Kind for Surfaces<'_> {
     ) -> Option<(Record<3>, Side)> {
         let world = geometry.world(self.scene);
         let hit = Self::hit(geometry, &candidate.ray)?;
-        let key = Key {
-            seed: self.seed,
-            purpose: Purpose::Record,
-            index: SURFACE | index,
-        };
+        let key = Light::Surface.key(self.seed, index);
         let g = quiet_enough(self.error, |attempt| {
             let n_rays = self.n_rays() * MORE_RAYS.pow(attempt as u32);
             irradiance(&world, &hit, n_rays, self.sky, self.reach, key)
