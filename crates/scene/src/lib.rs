@@ -39,9 +39,11 @@
 
 mod assemble;
 pub mod camera;
+pub mod camera_path;
 pub mod error;
 pub mod film;
 pub mod gltf;
+mod hermite;
 pub mod hierarchy;
 pub mod lights;
 pub mod load;
@@ -55,6 +57,7 @@ pub mod triangles;
 pub mod watertight;
 
 pub use camera::{Camera, CameraError};
+pub use camera_path::{CameraKey, CameraPath, CameraPathError};
 pub use error::{SceneError, Warning};
 pub use film::{FilmSize, FilmSizeError};
 pub use lights::LightSet;
