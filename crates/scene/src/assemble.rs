@@ -8,6 +8,7 @@ use crate::film::FilmSize;
 use crate::gltf::{self, GltfCamera, GltfScene, PunctualLight};
 use crate::lights::{EnvironmentLight, Light, LightSet, SkyLight, read_environment};
 use crate::load::{Fog, LoadOptions};
+use crate::motion::CameraMotion;
 use crate::paths::{Folder, PathError};
 use crate::scene::{RenderSettings, Scene};
 use crate::scene_file::{self, Place, SceneFile, numbers};
@@ -58,10 +59,11 @@ impl Assembly<'_> {
             media.push(fog);
         }
         let media = Media::new(media);
-        let camera = self.camera(file, &gltf.cameras, &bounds, film)?;
+        let (camera, motion) = self.camera(file, &gltf.cameras, &bounds, film)?;
         self.warn_of_darkness(&lights, &media, camera.eye());
         Ok(Scene {
             camera,
+            motion,
             film,
             settings: RenderSettings {
                 error: file.render.error.get(),
@@ -246,15 +248,19 @@ impl Assembly<'_> {
         .map_err(|error| self.wrong(format!("--fog: {error}")))
     }
 
+    /// The camera at frame 0, and how it moves if it does.
     fn camera(
         &self,
         file: &SceneFile,
         of_gltf: &[GltfCamera],
         bounds: &Aabb,
         film: FilmSize,
-    ) -> Result<Camera, SceneError> {
+    ) -> Result<(Camera, Option<CameraMotion>), SceneError> {
         let chosen = match &file.camera {
-            Some(scene_file::Camera::LookAt(look_at)) => return Ok(look_at.0),
+            Some(scene_file::Camera::LookAt(look_at)) => return Ok((look_at.0, None)),
+            Some(scene_file::Camera::Path(path)) => {
+                return self.moving(CameraMotion::Path(path.0.clone()));
+            }
             Some(scene_file::Camera::Gltf(name)) => Some(
                 of_gltf
                     .iter()
@@ -263,7 +269,7 @@ impl Assembly<'_> {
             ),
             None => of_gltf.first(),
         };
-        match chosen {
+        let still = match chosen {
             Some(camera) => Camera::placed(&camera.world_from_camera, camera.yfov)
                 .map_err(|error| self.wrong(error)),
             None => {
@@ -272,7 +278,15 @@ impl Assembly<'_> {
                     path: self.path.into(),
                 })
             }
-        }
+        }?;
+        Ok((still, None))
+    }
+
+    /// A moving camera and its view at frame 0.
+    fn moving(&self, motion: CameraMotion) -> Result<(Camera, Option<CameraMotion>), SceneError> {
+        let start = motion.at(0.0);
+        let camera = start.map_err(|error| self.wrong_field("camera", error))?;
+        Ok((camera, Some(motion)))
     }
 
     /// Warns of lights that cannot reach the scene and of scenes that nothing lights.

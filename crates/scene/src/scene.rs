@@ -4,8 +4,10 @@ use crate::camera::Camera;
 use crate::error::Warning;
 use crate::film::FilmSize;
 use crate::lights::LightSet;
+use crate::motion::{CameraMotion, FrameError};
 use crate::triangles::Triangles;
 use glam::Vec3;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use tyndall_math::Aabb;
 use tyndall_media::{Density, Media, Medium};
@@ -14,8 +16,10 @@ use tyndall_transport::World;
 /// Everything that is needed to render an image. Made by [`load`](crate::load()) and [`load_str`](crate::load_str).
 #[derive(Debug)]
 pub struct Scene {
-    /// Where it is seen from.
+    /// Where it is seen from; where the camera moves, at frame 0.
     pub camera: Camera,
+    /// How the camera moves; `None` where it stands still.
+    pub motion: Option<CameraMotion>,
     /// Size of the image.
     pub film: FilmSize,
     /// What the scene file asks of the renderer.
@@ -53,6 +57,23 @@ impl Scene {
             lights: &self.lights,
             media: &self.media,
         }
+    }
+
+    /// The camera at `frame`, which need not be whole: as [`CameraMotion::at`] says, or [`camera`](Self::camera) where it
+    /// stands still.
+    ///
+    /// # Errors
+    /// Where the camera moves through something that is no view; the error names the frame.
+    pub fn camera_at(&self, frame: f32) -> Result<Camera, FrameError> {
+        match &self.motion {
+            Some(motion) => motion.at(frame),
+            None => Ok(self.camera),
+        }
+    }
+
+    /// The frames over which the camera moves, first and last included; `None` where it stands still.
+    pub fn frames(&self) -> Option<RangeInclusive<u32>> {
+        self.motion.as_ref().map(CameraMotion::frames)
     }
 
     /// What kinds of media and phase functions there are, as in `media: 1 homogeneous; phase: isotropic`.

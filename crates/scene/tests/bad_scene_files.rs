@@ -65,6 +65,18 @@ const SCENES: &[&str] = &[
     "Scene(camera: LookAt(eye: (0, 0, 1), target: (0, 0, 0), vfov: 0))",
     "Scene(camera: LookAt(eye: (0, 0, 1), target: (0, 0, 1), vfov: 40))",
     "Scene(\n  camera: LookAt(eye: (0, 5, 0), target: (0, 0, 0), vfov: 40),\n)",
+    "Scene(camera: Path([]))",
+    "Scene(camera: Path())",
+    "Scene(camera: Path)",
+    "Scene(camera: Path(Key(frame: 0, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)))",
+    "Scene(camera: Path([Key(frame: -1, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)]))",
+    "Scene(camera: Path([Key(frame: inf, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)]))",
+    "Scene(camera: Path([Key(eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)]))",
+    "Scene(camera: Path([Key(frame: 0, eye: (0, 0, 1), target: (0, 0, 0), fov: 40)]))",
+    "Scene(camera: Path([Key(frame: 0, eye: (0, 0, 1), target: (0, 0, 0), vfov: 180)]))",
+    "Scene(camera: Path([Key(frame: 0, eye: (0, 0, 1), target: (0, 0, 1), vfov: 40)]))",
+    "Scene(camera: Path([\n  Key(frame: 9, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40),\n  Key(frame: 9, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40),\n]))",
+    "Scene(camera: Path([\n  (frame: 9, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40),\n  (frame: 10, eye: (0, 5, 0), target: (0, 0, 0), vfov: 40),\n]))",
     r#"Scene(camera: Gltf("front"))"#,
     "Scene()",
     "Scene(film: Film(width: 0))",
@@ -128,7 +140,7 @@ fn every_message_names_place_fault_and_remedy() {
     insta::assert_snapshot!(report);
 }
 
-/// One of everything, to be spoilt.
+/// One of everything but a camera that moves, to be spoilt.
 const ALL: &str = r#"Scene(
     camera: LookAt(eye: (0.5, 1.5, 3.5), target: (0.5, 1.5, 0.5), up: (0.5, 1.5, 0.5), vfov: 39.5),
     film: Film(width: 1024, height: 768),
@@ -149,6 +161,14 @@ const ALL: &str = r#"Scene(
             phase: Mixture([(0.8, HenyeyGreenstein(g: 0.5)), (0.2, Isotropic)])),
     ],
     render: Render(error: 0.5, max_depth: 7, exposure: 0.5),
+)"#;
+
+/// A camera that moves, to be spoilt.
+const PATH: &str = r#"Scene(
+    camera: Path([
+        Key(frame: 0.5, eye: (0.5, 1.5, 3.5), target: (0.5, 1.5, 0.5), up: (0.5, 1.5, 0.5), vfov: 39.5),
+        (frame: 47.5, eye: (2.5, 1.5, 3.5), target: (0.5, 1.5, 0.5), vfov: 59.5),
+    ]),
 )"#;
 
 /// Byte ranges of the numbers in `text`.
@@ -173,14 +193,15 @@ fn numbers(text: &str) -> Vec<std::ops::Range<usize>> {
 
 #[test]
 fn no_numeric_field_takes_nan_infinity_or_what_f32_cannot_hold() {
-    assert!(parse(ALL.as_bytes(), Path::new("scene.ron")).is_ok());
-    let ranges = numbers(ALL);
-    assert!(ranges.len() > 90, "{}", ranges.len());
-    for range in ranges {
+    let ranges = |text| numbers(text).into_iter().map(move |range| (text, range));
+    let all: Vec<_> = ranges(ALL).chain(ranges(PATH)).collect();
+    assert!(all.len() > 110, "{}", all.len());
+    for (sound, range) in all {
+        assert!(parse(sound.as_bytes(), Path::new("scene.ron")).is_ok());
         for bad in [
             "NaN", "-NaN", "inf", "-inf", "1e400", "-1e400", "1e39", "nan", "\"1\"", "()",
         ] {
-            let mut text = String::from(ALL);
+            let mut text = String::from(sound);
             text.replace_range(range.clone(), bad);
             let line_start = text[..range.start].rfind('\n').map_or(0, |i| i + 1);
             let line = text[..range.start].matches('\n').count() + 1;
@@ -195,15 +216,17 @@ fn no_numeric_field_takes_nan_infinity_or_what_f32_cannot_hold() {
 #[test]
 fn a_file_cut_short_or_spoilt_anywhere_is_an_error_or_a_scene_but_never_a_panic() {
     let path = Path::new("scene.ron");
-    for end in 0..ALL.len() {
-        parse(&ALL.as_bytes()[..end], path).unwrap_err();
-    }
-    for i in 0..ALL.len() {
+    for (text, end) in [ALL, PATH]
+        .map(|text| (0..text.len()).map(move |i| (text, i)))
+        .into_iter()
+        .flatten()
+    {
+        parse(&text.as_bytes()[..end], path).unwrap_err();
         for byte in [
             b'(', b')', b'"', b'-', b'9', b',', b':', b'\\', b'/', b'*', 0, 0xff,
         ] {
-            let mut bytes = ALL.as_bytes().to_vec();
-            bytes[i] = byte;
+            let mut bytes = text.as_bytes().to_vec();
+            bytes[end] = byte;
             if let Err(error) = parse(&bytes, path) {
                 assert!(error.to_string().contains("scene.ron:"), "{error}");
             }

@@ -175,6 +175,28 @@ fn a_gltf_beside_the_scene_file_gives_surfaces_and_cameras() {
 }
 
 #[test]
+fn a_path_moves_the_camera_and_a_still_camera_is_the_same_at_every_frame() {
+    let still = scene(&format!("Scene({CAMERA})"));
+    assert_eq!(still.frames(), None);
+    for frame in [0.0, 12.5, 1e9, f32::NAN] {
+        assert_eq!(still.camera_at(frame), Ok(still.camera));
+    }
+    let moving = scene(
+        "Scene(camera: Path([
+            Key(frame: 2, eye: (0, 1, 5), target: (0, 1, 0), vfov: 40),
+            Key(frame: 10, eye: (8, 1, 5), target: (8, 1, 0), vfov: 40)]))",
+    );
+    assert_eq!(moving.frames(), Some(2..=10));
+    assert_eq!(
+        moving.camera, still.camera,
+        "frame 0 stands at the first key"
+    );
+    let eye = moving.camera_at(3.0).unwrap().eye();
+    // Rounding of f32 coordinates below 8.
+    assert!((eye - Vec3::new(1.0, 1.0, 5.0)).length() < 1e-6, "{eye}");
+}
+
+#[test]
 fn a_bare_gltf_with_fog_is_a_scene() {
     let (_dir, folder) = folder();
     let scene = load(&folder.join("square.gltf"), &fog(0.25)).unwrap();

@@ -113,6 +113,20 @@ fn what_is_left_out_has_the_contracts_default() {
 }
 
 #[test]
+fn a_camera_path_is_a_list_of_keys() {
+    let path = |keys: &str| read(&format!("Scene(camera: Path([{keys}]))")).camera;
+    let full = "Key(frame: 0.0, eye: (0.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), up: (0.0, 1.0, 0.0), vfov: 50.0),
+        Key(frame: 47.0, eye: (2.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), up: (0.0, 1.0, 0.0), vfov: 40.0),";
+    let Some(Camera::Path(read)) = path(full) else {
+        panic!("not a path");
+    };
+    assert_eq!(read.0.span(), [0.0, 47.0]);
+    let bare = "(frame: 0, eye: (0, 1, 4), target: (0, 1, 0), vfov: 50), (frame: 47, eye: (2, 1, 4), target: (0, 1, 0), vfov: 40)";
+    assert_eq!(path(bare), path(full));
+    assert!(path("Key(frame: 2.5, eye: (0, 1, 4), target: (0, 1, 0), vfov: 50)").is_some());
+}
+
+#[test]
 fn options_are_read_with_and_without_some() {
     for (with, without) in [
         (r#"gltf: Some("a.glb")"#, r#"gltf: "a.glb""#),
@@ -121,6 +135,10 @@ fn options_are_read_with_and_without_some() {
         (
             "camera: Some(LookAt(eye: (0, 0, 1), target: (0, 0, 0), vfov: 40))",
             "camera: LookAt(eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)",
+        ),
+        (
+            "camera: Some(Path([Key(frame: 0, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)]))",
+            "camera: Path([Key(frame: 0, eye: (0, 0, 1), target: (0, 0, 0), vfov: 40)])",
         ),
         ("camera: None", ""),
         (

@@ -5,7 +5,9 @@ pub(super) fn form_of(field: &str) -> Option<&'static str> {
     let form = match field {
         "gltf" | "file" => "a path in double quotes, relative to the scene file",
         "name" | "grid" | "gltf_scene" => "a name in double quotes",
-        "camera" => "LookAt(eye: (x, y, z), target: (x, y, z), vfov: degrees) or Gltf(\"name\")",
+        "camera" => {
+            "LookAt(eye: (x, y, z), target: (x, y, z), vfov: degrees), Path([Key(frame: number, …), …]) or Gltf(\"name\")"
+        }
         "film" => "Film(width: pixels, height: pixels)",
         "lights" => {
             "a bracketed list of lights: [Point(…), Spot(…), Directional(…), Sky(…), Environment(…)]"
@@ -20,6 +22,7 @@ pub(super) fn form_of(field: &str) -> Option<&'static str> {
             "a linear RGB colour: three numbers in parentheses, (r, g, b)"
         }
         "vfov" | "inner_cone" | "outer_cone" | "rotation" => "a number of degrees",
+        "frame" => "the number of a frame, from 0 on",
         "radius" | "base" | "scale_height" => "a number of metres",
         "scale" | "g" | "error" => "a number",
         "exposure" => "a number of stops",
@@ -82,6 +85,7 @@ mod tests {
         for (owner, text) in [
             ("Scene", "Scene(?: 0)"),
             ("LookAt", "Scene(camera: LookAt(?: 0))"),
+            ("Key", "Scene(camera: Path([Key(?: 0)]))"),
             ("Film", "Scene(film: Film(?: 0))"),
             ("Render", "Scene(render: Render(?: 0))"),
             ("Point", "Scene(lights: [Point(?: 0)])"),

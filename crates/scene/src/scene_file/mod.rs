@@ -6,6 +6,7 @@
 //! Variants that need a check across their fields are newtypes around a struct of `…Fields`; RON's `UNWRAP_VARIANT_NEWTYPES`
 //! lets them be written with one pair of parentheses.
 
+pub mod camera;
 mod fault;
 mod forms;
 pub mod lights;
@@ -13,17 +14,14 @@ pub mod media;
 pub mod numbers;
 mod outline;
 
+pub use camera::{Camera, LookAt};
 pub use fault::{Fault, Place, SceneFileError};
 pub(crate) use outline::place_of;
 
-use crate::{
-    camera,
-    film::{FilmSize, FilmSizeError},
-};
-use glam::Vec3;
+use crate::film::{FilmSize, FilmSizeError};
 use lights::Light;
 use media::Medium;
-use numbers::{Depth, Direction, FieldOfView, PixelCount, Position, Stops, TargetError};
+use numbers::{Depth, PixelCount, Stops, TargetError};
 use ron::extensions::Extensions;
 use serde::Deserialize;
 use std::path::Path;
@@ -46,43 +44,6 @@ pub struct SceneFile {
     pub media: Vec<Medium>,
     /// How the scene is to be rendered.
     pub render: Render,
-}
-
-/// Where a scene is seen from.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub enum Camera {
-    /// From one point towards another.
-    LookAt(LookAt),
-    /// Through the glTF camera of this name.
-    Gltf(String),
-}
-
-/// `LookAt(eye: (0, 1, 4), target: (0, 1, 0), up: (0, 1, 0), vfov: 40)`, known to be a camera.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "LookAtFields")]
-pub struct LookAt(pub camera::Camera);
-
-#[derive(Deserialize)]
-#[serde(rename = "LookAt", deny_unknown_fields)]
-struct LookAtFields {
-    eye: Position,
-    target: Position,
-    #[serde(default = "straight_up")]
-    up: Direction,
-    vfov: FieldOfView,
-}
-
-fn straight_up() -> Direction {
-    Direction(Vec3::Y)
-}
-
-impl TryFrom<LookAtFields> for LookAt {
-    type Error = camera::CameraError;
-
-    fn try_from(fields: LookAtFields) -> Result<Self, Self::Error> {
-        let yfov = fields.vfov.get().to_radians();
-        camera::Camera::look_at(fields.eye.0, fields.target.0, fields.up.0, yfov).map(Self)
-    }
 }
 
 /// `Film(width: 1024, height: 768)`, known to be neither empty nor too large.

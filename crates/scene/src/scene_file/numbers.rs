@@ -91,6 +91,11 @@ checked_number!(
     "a field of view lies in (0, 180) degrees, both ends excluded"
 );
 checked_number!(
+    /// Number of a frame of a camera path; whole numbers are frames that are rendered.
+    FrameNumber, |x| (0.0..=1e7).contains(&x),
+    "a frame is a number from 0 to 1e7"
+);
+checked_number!(
     /// Half-angle of a cone in degrees.
     ConeAngle, |x| (0.0..=90.0).contains(&x),
     "the half-angle of a cone lies from 0 to 90 degrees"
