@@ -5,7 +5,7 @@
 use crate::camera::Camera;
 use crate::error::{SceneError, Warning};
 use crate::film::FilmSize;
-use crate::gltf::{self, GltfCamera, GltfScene, PunctualLight};
+use crate::gltf::{self, AnimatedCamera, GltfCamera, GltfScene, PunctualLight};
 use crate::lights::{EnvironmentLight, Light, LightSet, SkyLight, read_environment};
 use crate::load::{Fog, LoadOptions};
 use crate::motion::CameraMotion;
@@ -80,7 +80,7 @@ impl Assembly<'_> {
     }
 
     fn film(&self, file: &SceneFile) -> Result<FilmSize, SceneError> {
-        let FilmSize { width, height } = file.film.0;
+        let FilmSize { width, height } = file.film.size;
         let width = self.options.width.unwrap_or(width);
         let height = self.options.height.unwrap_or(height);
         FilmSize::new(width, height).map_err(|error| self.wrong(error))
@@ -98,6 +98,13 @@ impl Assembly<'_> {
                 allow_external: self.options.allow_external,
                 root: Some(root),
                 scene: file.gltf_scene.clone(),
+                animated: match &file.camera {
+                    None => AnimatedCamera::First,
+                    Some(scene_file::Camera::Gltf(name)) => AnimatedCamera::Named(name.clone()),
+                    Some(scene_file::Camera::LookAt(_) | scene_file::Camera::Path(_)) => {
+                        AnimatedCamera::None
+                    }
+                },
             },
         )
     }
@@ -269,6 +276,15 @@ impl Assembly<'_> {
             ),
             None => of_gltf.first(),
         };
+        if let Some(camera) = chosen
+            && let Some(animation) = &camera.animation
+        {
+            return self.moving(CameraMotion::Animation {
+                animation: animation.clone(),
+                yfov: camera.yfov,
+                fps: file.film.fps.get(),
+            });
+        }
         let still = match chosen {
             Some(camera) => Camera::placed(&camera.world_from_camera, camera.yfov)
                 .map_err(|error| self.wrong(error)),
@@ -285,7 +301,7 @@ impl Assembly<'_> {
     /// A moving camera and its view at frame 0.
     fn moving(&self, motion: CameraMotion) -> Result<(Camera, Option<CameraMotion>), SceneError> {
         let start = motion.at(0.0);
-        let camera = start.map_err(|error| self.wrong_field("camera", error))?;
+        let camera = start.map_err(|error| self.wrong(error))?;
         Ok((camera, Some(motion)))
     }
 

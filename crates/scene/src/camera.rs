@@ -46,8 +46,11 @@ pub enum CameraError {
         /// The angle asked for.
         degrees: f32,
     },
-    /// A transform flattens the camera or is not finite.
-    #[error("the camera's node transform is not finite or flattens an axis; it must be invertible")]
+    /// A transform flattens the camera, is not finite or reaches beyond all bounds.
+    #[error(
+        "the camera's node transform is not finite, flattens an axis or leads further than 1e12 m from the origin; it must be \
+         invertible"
+    )]
     Transform,
 }
 

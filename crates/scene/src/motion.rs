@@ -2,6 +2,7 @@
 
 use crate::camera::{Camera, CameraError};
 use crate::camera_path::CameraPath;
+use crate::gltf::CameraAnimation;
 use std::ops::RangeInclusive;
 
 /// How a camera moves from frame to frame.
@@ -10,6 +11,15 @@ use std::ops::RangeInclusive;
 pub enum CameraMotion {
     /// Along the curve of a scene file.
     Path(CameraPath),
+    /// As an animation of a glTF file moves it.
+    Animation {
+        /// Where it stands at each time.
+        animation: CameraAnimation,
+        /// Vertical field of view in radians, in (0, π).
+        yfov: f32,
+        /// Frames per second: frame f is shown at f / fps seconds.
+        fps: f32,
+    },
 }
 
 /// There is no view at some frame of a moving camera.
@@ -31,6 +41,14 @@ impl CameraMotion {
     pub fn at(&self, frame: f32) -> Result<Camera, FrameError> {
         let camera = match self {
             Self::Path(path) => path.at(frame),
+            // In f32, as keyframes are: a frame then comes out at the very keyframe that was made for it.
+            Self::Animation {
+                animation,
+                yfov,
+                fps,
+            } => animation
+                .at(frame / fps)
+                .and_then(|pose| Camera::placed(&pose, *yfov)),
         };
         camera.map_err(|source| FrameError { frame, source })
     }
@@ -39,6 +57,7 @@ impl CameraMotion {
     pub fn span(&self) -> [f32; 2] {
         match self {
             Self::Path(path) => path.span(),
+            Self::Animation { animation, fps, .. } => animation.span().map(|time| time * fps),
         }
     }
 

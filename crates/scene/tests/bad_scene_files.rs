@@ -84,6 +84,9 @@ const SCENES: &[&str] = &[
     "Scene(film: Film(height: 1.5))",
     "Scene(film: Film(width: 2147483648))",
     "Scene(film: Film(width: 65536, height: 65536))",
+    "Scene(film: Film(fps: 0))",
+    "Scene(film: Film(fps: inf))",
+    "Scene(film: Film(fps: -24))",
     "Scene(lights: [Spot(position: (0, 0, 0), direction: (0, 0, 0), intensity: (1, 1, 1), inner_cone: 1, outer_cone: 2)])",
     "Scene(lights: [Spot(position: (0, 0, 0), direction: (0, 1, 0), intensity: (1, 1, 1), inner_cone: 3, outer_cone: 2)])",
     "Scene(lights: [Spot(position: (0, 0, 0), direction: (0, 1, 0), intensity: (1, 1, 1), inner_cone: 3, outer_cone: 180)])",
@@ -143,7 +146,7 @@ fn every_message_names_place_fault_and_remedy() {
 /// One of everything but a camera that moves, to be spoilt.
 const ALL: &str = r#"Scene(
     camera: LookAt(eye: (0.5, 1.5, 3.5), target: (0.5, 1.5, 0.5), up: (0.5, 1.5, 0.5), vfov: 39.5),
-    film: Film(width: 1024, height: 768),
+    film: Film(width: 1024, height: 768, fps: 24.5),
     lights: [
         Point(position: (0.5, 1.5, 0.5), intensity: (8.5, 8.5, 8.5)),
         Spot(position: (1.5, 2.5, 3.5), direction: (0.5, -2.5, 0.5), intensity: (4.5, 5.5, 6.5), inner_cone: 10.5, outer_cone: 20.5),

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a failing test panics")]
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
+use serde_json::{Value, json};
 use std::path::Path;
 use tyndall_scene::{Camera, Fog, LoadOptions, Scene, SceneError, Warning, load, load_str};
 
@@ -194,6 +197,71 @@ fn a_path_moves_the_camera_and_a_still_camera_is_the_same_at_every_frame() {
     let eye = moving.camera_at(3.0).unwrap().eye();
     // Rounding of f32 coordinates below 8.
     assert!((eye - Vec3::new(1.0, 1.0, 5.0)).length() < 1e-6, "{eye}");
+}
+
+/// The square whose camera "front" stands at x = 0, 1 and 2 m from frames 0, 1 and 3 of 24 a second on.
+fn animated_square() -> String {
+    let times = [0.0f32, 1.0 / 24.0, 3.0 / 24.0];
+    let places = [0.0, 0.0, 3.0, 1.0, 0.0, 3.0, 2.0, 0.0, 3.0];
+    let bytes: Vec<u8> = times
+        .into_iter()
+        .chain(places)
+        .flat_map(f32::to_le_bytes)
+        .collect();
+    let uri = format!("data:;base64,{}", STANDARD.encode(&bytes));
+    let mut file: Value = serde_json::from_str(SQUARE).unwrap();
+    let mut add = |key: &str, value: Value| file[key].as_array_mut().unwrap().push(value);
+    add("buffers", json!({"byteLength": 48, "uri": uri}));
+    add("bufferViews", json!({"buffer": 1, "byteLength": 48}));
+    let float = 5126;
+    add(
+        "accessors",
+        json!({"bufferView": 2, "componentType": float, "count": 3, "type": "SCALAR"}),
+    );
+    add(
+        "accessors",
+        json!({"bufferView": 2, "byteOffset": 12, "componentType": float, "count": 3, "type": "VEC3"}),
+    );
+    file["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}],
+        "samplers": [{"input": 2, "output": 3, "interpolation": "STEP"}],
+    }]);
+    file.to_string()
+}
+
+#[test]
+fn an_animated_gltf_camera_moves_at_the_films_frame_rate() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("a.gltf"), animated_square()).unwrap();
+    let load_with = |fields: &str| {
+        let text = format!("Scene(gltf: \"a.gltf\", {fields})");
+        load_str(&text, dir.path(), &LoadOptions::default()).unwrap()
+    };
+    let x = |scene: &Scene, frame: f32| scene.camera_at(frame).unwrap().eye().x;
+    for (fields, frames) in [
+        ("", [0.0, 1.0, 3.0]),
+        ("camera: Gltf(\"front\")", [0.0, 1.0, 3.0]),
+        ("film: Film(fps: 24)", [0.0, 1.0, 3.0]),
+        ("film: Film(fps: 48)", [0.0, 2.0, 6.0]),
+        ("film: Film(fps: 240, width: 8)", [0.0, 10.0, 30.0]),
+    ] {
+        let scene = load_with(fields);
+        assert_eq!(scene.frames(), Some(0..=frames[2] as u32), "{fields}");
+        assert_eq!(scene.camera.eye().x, 0.0);
+        // A step is taken at its own frame, and not a rounding of its time later.
+        for (i, frame) in frames.into_iter().enumerate() {
+            assert_eq!(x(&scene, frame), i as f32, "{fields}");
+            assert_eq!(x(&scene, frame + 0.5), i as f32, "{fields}");
+        }
+        let length = scene.motion.as_ref().unwrap().length();
+        assert!((length - 2.0).abs() < 1e-6, "{length}");
+        assert!((scene.camera.yfov() - 0.5).abs() < 1e-6);
+    }
+    for still in [CAMERA, "camera: Gltf(\"side\")"] {
+        assert_eq!(load_with(still).frames(), None, "{still}");
+    }
+    let bare = load(&dir.path().join("a.gltf"), &fog(0.25)).unwrap();
+    assert_eq!(bare.frames(), Some(0..=3));
 }
 
 #[test]

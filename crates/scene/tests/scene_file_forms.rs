@@ -46,7 +46,7 @@ fn the_contracts_example_is_read() {
     let scene = read(EXAMPLE);
     assert_eq!(scene.gltf.as_deref(), Some("cornell.glb"));
     assert!(matches!(scene.camera, Some(Camera::LookAt(_))));
-    assert_eq!((scene.film.0.width, scene.film.0.height), (1024, 768));
+    assert_eq!((scene.film.size.width, scene.film.size.height), (1024, 768));
     assert_eq!(scene.lights.len(), 5);
     let Light::Spot(spot) = &scene.lights[1] else {
         panic!("{:?}", scene.lights[1]);
@@ -71,7 +71,7 @@ fn the_example_with_dos_line_ends_and_a_byte_order_mark_is_the_same() {
 fn what_is_left_out_has_the_contracts_default() {
     let shown = read(
         r#"Scene(
-            film: Film(width: 1024, height: 768), lights: [], media: [],
+            film: Film(width: 1024, height: 768, fps: 24.0), lights: [], media: [],
             render: Render(error: 0.03, max_depth: None, exposure: 0.0),
         )"#,
     );

@@ -25,8 +25,8 @@ pub(super) struct Expected<'a> {
     pub(super) types: &'a [Type],
     /// Whether integers may stand for numbers outside [−1, 1], as `KHR_mesh_quantization` allows.
     pub(super) plain_integers: bool,
-    /// The number of elements, where it is known.
-    pub(super) count: Option<usize>,
+    /// The number of elements, where it is known, and why that many, as in "one element per vertex".
+    pub(super) count: Option<(usize, &'static str)>,
 }
 
 /// An accessor whose shape is known to be sound.
@@ -60,11 +60,11 @@ impl<'a> Accessors<'a> {
                 format!("the use at {pointer} allows {:?}", expected.types),
             ));
         }
-        if let Some(count) = expected.count.filter(|&count| count != checks.count) {
+        if let Some((count, reason)) = expected.count.filter(|(count, _)| *count != checks.count) {
             return Err(GltfError::value(
                 format!("{at}/count"),
                 checks.count,
-                format!("the use at {pointer} needs one element per vertex, {count}"),
+                format!("the use at {pointer} needs {reason}, {count}"),
             ));
         }
         let normalized = checks.accessor.normalized;

@@ -1,12 +1,13 @@
 //! Perspective cameras of a glTF file, placed in the world.
 
+use super::animation::CameraAnimation;
 use super::error::{GltfError, get};
 use super::nodes::Placed;
 use crate::error::Warning;
 use ::gltf::json::Root;
 use ::gltf::json::camera::Type;
 use ::gltf::json::validation::Checked;
-use glam::{Affine3A, Mat3A, Vec3A};
+use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 use std::f32::consts::PI;
 
 /// A perspective camera.
@@ -23,6 +24,31 @@ pub struct GltfCamera {
     pub yfov: f32,
     /// Width over height, where the file states it.
     pub aspect: Option<f32>,
+    /// How animations move the camera; read for the one that [`ReadOptions::animated`](super::ReadOptions) names.
+    pub animation: Option<CameraAnimation>,
+}
+
+/// Which camera's animation is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AnimatedCamera {
+    /// That of the file's first camera.
+    #[default]
+    First,
+    /// That of the first camera with this name.
+    Named(String),
+    /// That of none: the scene is seen otherwise.
+    None,
+}
+
+impl AnimatedCamera {
+    /// Which of `cameras` it is.
+    pub(super) fn position(&self, cameras: &[GltfCamera]) -> Option<usize> {
+        match self {
+            Self::First => (!cameras.is_empty()).then_some(0),
+            Self::Named(name) => cameras.iter().position(|camera| camera.is_called(name)),
+            Self::None => None,
+        }
+    }
 }
 
 impl GltfCamera {
@@ -81,19 +107,26 @@ pub(super) fn on_node(
             "it is finite and greater than 0",
         ));
     }
-    let forward = placed.forward()?;
-    let up = placed.world.matrix3.y_axis;
-    let right = forward.cross(up).normalize();
-    let axes = [right, right.cross(forward), -forward].map(|axis| Vec3A::from(axis.as_vec3()));
-    let [x, y, z] = axes;
+    placed.check_invertible()?;
     Ok(Some(GltfCamera {
         name: camera.name.clone(),
         node: placed.node.name.clone(),
-        world_from_camera: Affine3A {
-            matrix3: Mat3A::from_cols(x, y, z),
-            translation: placed.position()?.into(),
-        },
+        world_from_camera: pose(&placed.world, placed.position()?),
         yfov,
         aspect,
+        animation: None,
     }))
+}
+
+/// The rigid placement of a camera at `eye` on a node whose transform is invertible: it looks along the node's −z axis, with
+/// the node's y axis upward in the image, however that is scaled or sheared.
+pub(super) fn pose(world: &DAffine3, eye: Vec3) -> Affine3A {
+    let forward = -world.matrix3.z_axis.normalize();
+    let right = forward.cross(world.matrix3.y_axis).normalize();
+    let axes = [right, right.cross(forward), -forward].map(|axis| Vec3A::from(axis.as_vec3()));
+    let [x, y, z] = axes;
+    Affine3A {
+        matrix3: Mat3A::from_cols(x, y, z),
+        translation: eye.into(),
+    }
 }

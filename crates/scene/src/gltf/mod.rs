@@ -4,10 +4,13 @@
 //! module has to check again.
 
 mod accessor;
+mod animation;
 mod assemble;
 mod buffers;
+mod bystanders;
 mod cameras;
 mod container;
+mod curve;
 mod error;
 mod images;
 mod materials;
@@ -16,7 +19,8 @@ mod primitives;
 pub(crate) mod punctual;
 mod tally;
 
-pub use cameras::GltfCamera;
+pub use animation::CameraAnimation;
+pub use cameras::{AnimatedCamera, GltfCamera};
 pub use error::GltfError;
 pub use punctual::PunctualLight;
 
@@ -42,6 +46,8 @@ pub struct ReadOptions {
     pub root: Option<PathBuf>,
     /// Name of the scene to show; without it the file's default scene, or else its first.
     pub scene: Option<String>,
+    /// The camera whose animation is read.
+    pub animated: AnimatedCamera,
 }
 
 /// What a glTF file shows, in world space.
@@ -78,7 +84,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<GltfScene, SceneError>
     if let Some(root) = &options.root {
         folder = folder.confined_to(root).map_err(io_error)?;
     }
-    let converted = convert(&bytes, &folder, options.scene.as_deref());
+    let converted = convert(&bytes, &folder, options);
     let mut scene = converted.map_err(|error| SceneError::Gltf {
         error: Box::new(error),
         path: path.into(),
@@ -89,7 +95,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<GltfScene, SceneError>
 }
 
 /// Turns the bytes of a file into a scene.
-fn convert(bytes: &[u8], folder: &Folder, scene: Option<&str>) -> Result<GltfScene, GltfError> {
+fn convert(bytes: &[u8], folder: &Folder, options: &ReadOptions) -> Result<GltfScene, GltfError> {
     let document = container::parse(bytes)?;
     let json = &document.json;
     let mut warnings = Vec::new();
@@ -102,17 +108,27 @@ fn convert(bytes: &[u8], folder: &Folder, scene: Option<&str>) -> Result<GltfSce
             pointer: "/extensionsUsed".into(),
         });
     }
-    let placed = nodes::walk(json, scene, &mut warnings)?;
+    let placed = nodes::walk(json, options.scene.as_deref(), &mut warnings)?;
     let buffers = Buffers::new(json, document.binary, folder);
+    let accessors = Accessors::new(json, &buffers);
     let materials = Materials::new(json, Images::new(json, &buffers));
-    let mut builder = MeshBuilder::new(json, Accessors::new(json, &buffers), materials);
+    let mut builder = MeshBuilder::new(json, accessors, materials);
     let mut lights = Vec::new();
     let mut ranged = Vec::new();
     let mut cameras = Vec::new();
-    for node in &placed {
+    let mut nodes_of_cameras = Vec::new();
+    for (i, node) in placed.iter().enumerate() {
         builder.add_node(node, &mut warnings)?;
         lights.extend(punctual::on_node(json, node, &mut ranged)?);
-        cameras.extend(cameras::on_node(json, node, &mut warnings)?);
+        if let Some(camera) = cameras::on_node(json, node, &mut warnings)? {
+            cameras.push(camera);
+            nodes_of_cameras.push(i);
+        }
+    }
+    bystanders::warn(json, &placed, &mut warnings)?;
+    if let Some(i) = options.animated.position(&cameras) {
+        cameras[i].animation =
+            animation::of_camera(json, accessors, &placed, nodes_of_cameras[i], &mut warnings)?;
     }
     if !ranged.is_empty() {
         ranged.sort();

@@ -9,11 +9,16 @@ use ::gltf::json::Root;
 use ::gltf::json::scene::{Node, Scene};
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
 
+/// Shortest quaternion that is taken for a rotation; f32 input says nothing about the direction of a shorter one.
+pub(super) const MIN_ROTATION: f64 = 1e-6;
+
 /// A node and its place in the world.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed<'a> {
     pub(super) index: usize,
     pub(super) node: &'a Node,
+    /// Where its parent stands in the list that [`walk`] returns; `None` for a root of the scene.
+    pub(super) parent: Option<usize>,
     /// In f64: a product of many f32 transforms keeps the precision of its factors.
     pub(super) world: DAffine3,
 }
@@ -31,10 +36,7 @@ impl Placed<'_> {
 
     /// Fails where the transform flattens space: nothing can be drawn, lit or looked at through it.
     pub(super) fn check_invertible(&self) -> Result<(), GltfError> {
-        let m = self.world.matrix3;
-        let lengths = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-        // The determinant of unit columns, so that the scale does not matter; products of f64 err by some 1e-16.
-        if (m.determinant() / lengths).abs() > 1e-12 {
+        if is_invertible(&self.world.matrix3) {
             return Ok(());
         }
         Err(self.fault(
@@ -58,6 +60,31 @@ impl Placed<'_> {
     }
 }
 
+/// Whether the transform keeps space from being flattened; its scale does not matter.
+pub(super) fn is_invertible(m: &DMat3) -> bool {
+    let lengths = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
+    // The determinant of unit columns; products of f64 err by some 1e-16.
+    (m.determinant() / lengths).abs() > 1e-12
+}
+
+/// A transform as the glTF's translation, rotation and scale, applied in the opposite order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Trs {
+    pub(super) translation: DVec3,
+    /// Of unit length.
+    pub(super) rotation: DQuat,
+    pub(super) scale: DVec3,
+}
+
+impl Trs {
+    pub(super) fn transform(&self) -> DAffine3 {
+        DAffine3 {
+            matrix3: DMat3::from_quat(self.rotation) * DMat3::from_diagonal(self.scale),
+            translation: self.translation,
+        }
+    }
+}
+
 /// All nodes of the scene called `name`, or of the default scene, or of the first; parents come before children.
 pub(super) fn walk<'a>(
     json: &'a Root,
@@ -71,10 +98,10 @@ pub(super) fn walk<'a>(
         .rev()
         .map(|i| {
             let at = format!("/scenes/{scene_index}/nodes/{i}");
-            (scene.nodes[i], DAffine3::IDENTITY, at)
+            (scene.nodes[i], None, DAffine3::IDENTITY, at)
         })
         .collect();
-    while let Some((node_index, parent, at)) = stack.pop() {
+    while let Some((node_index, parent, world_from_parent, at)) = stack.pop() {
         let index = node_index.value();
         let node = get(&json.nodes, index, "nodes", || at.clone())?;
         if std::mem::replace(&mut visited[index], true) {
@@ -84,11 +111,22 @@ pub(super) fn walk<'a>(
                 pointer: at,
             });
         }
-        let world = parent * local_transform(index, node, warnings)?;
-        placed.push(Placed { index, node, world });
+        let world = world_from_parent * local_transform(index, node, warnings)?;
+        let position = placed.len();
+        placed.push(Placed {
+            index,
+            node,
+            parent,
+            world,
+        });
         let children = node.children.as_deref().unwrap_or_default();
         for (i, &child) in children.iter().enumerate().rev() {
-            stack.push((child, world, format!("/nodes/{index}/children/{i}")));
+            stack.push((
+                child,
+                Some(position),
+                world,
+                format!("/nodes/{index}/children/{i}"),
+            ));
         }
     }
     Ok(placed)
@@ -118,7 +156,7 @@ fn choose_scene<'a>(json: &'a Root, name: Option<&str>) -> Result<(usize, &'a Sc
 }
 
 /// The transform a node applies to its children.
-fn local_transform(
+pub(super) fn local_transform(
     index: usize,
     node: &Node,
     warnings: &mut Vec<Warning>,
@@ -137,6 +175,15 @@ fn local_transform(
         }
         return Ok(DAffine3::from_mat4(m));
     }
+    trs(index, node, warnings).map(|trs| trs.transform())
+}
+
+/// Translation, rotation and scale of a node that has no matrix.
+pub(super) fn trs(
+    index: usize,
+    node: &Node,
+    warnings: &mut Vec<Warning>,
+) -> Result<Trs, GltfError> {
     let vector = |v: Option<[f32; 3]>, default| v.map_or(default, |v| Vec3::from(v).as_dvec3());
     let translation = vector(node.translation, DVec3::ZERO);
     let scale = vector(node.scale, DVec3::ONE);
@@ -147,7 +194,7 @@ fn local_transform(
         return Err(fault(index, node, problem));
     }
     let length = rotation.length();
-    if length < 1e-6 {
+    if length < MIN_ROTATION {
         let problem = "has a rotation of length 0; a unit quaternion is needed";
         return Err(fault(index, node, problem));
     }
@@ -161,9 +208,10 @@ fn local_transform(
             pointer: pointer(index),
         });
     }
-    Ok(DAffine3 {
-        matrix3: DMat3::from_quat(rotation / length) * DMat3::from_diagonal(scale),
+    Ok(Trs {
         translation,
+        rotation: rotation / length,
+        scale,
     })
 }
 

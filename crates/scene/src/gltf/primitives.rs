@@ -76,7 +76,7 @@ pub(super) fn read(
     }
     let n = positions.len();
     let expected = Expected {
-        count: Some(n),
+        count: Some((n, "one element per vertex")),
         ..expected
     };
     let mut n_bad_normals = 0;

@@ -8,7 +8,7 @@ pub(super) fn form_of(field: &str) -> Option<&'static str> {
         "camera" => {
             "LookAt(eye: (x, y, z), target: (x, y, z), vfov: degrees), Path([Key(frame: number, …), …]) or Gltf(\"name\")"
         }
-        "film" => "Film(width: pixels, height: pixels)",
+        "film" => "Film(width: pixels, height: pixels, fps: number)",
         "lights" => {
             "a bracketed list of lights: [Point(…), Spot(…), Directional(…), Sky(…), Environment(…)]"
         }
@@ -22,6 +22,7 @@ pub(super) fn form_of(field: &str) -> Option<&'static str> {
             "a linear RGB colour: three numbers in parentheses, (r, g, b)"
         }
         "vfov" | "inner_cone" | "outer_cone" | "rotation" => "a number of degrees",
+        "fps" => "a number of frames per second",
         "frame" => "the number of a frame, from 0 on",
         "radius" | "base" | "scale_height" => "a number of metres",
         "scale" | "g" | "error" => "a number",

@@ -21,7 +21,7 @@ pub(crate) use outline::place_of;
 use crate::film::{FilmSize, FilmSizeError};
 use lights::Light;
 use media::Medium;
-use numbers::{Depth, PixelCount, Stops, TargetError};
+use numbers::{Depth, FrameRate, PixelCount, Stops, TargetError};
 use ron::extensions::Extensions;
 use serde::Deserialize;
 use std::path::Path;
@@ -36,7 +36,7 @@ pub struct SceneFile {
     pub gltf_scene: Option<String>,
     /// Where the scene is seen from; left out: the glTF's first camera.
     pub camera: Option<Camera>,
-    /// Size of the image.
+    /// Size of the image, and frames per second.
     pub film: Film,
     /// Lights, added to the glTF's own.
     pub lights: Vec<Light>,
@@ -46,16 +46,22 @@ pub struct SceneFile {
     pub render: Render,
 }
 
-/// `Film(width: 1024, height: 768)`, known to be neither empty nor too large.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+/// `Film(width: 1024, height: 768, fps: 24)`, known to be neither empty nor too large.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(try_from = "FilmFields")]
-pub struct Film(pub FilmSize);
+pub struct Film {
+    /// Size of each image.
+    pub size: FilmSize,
+    /// Frames per second, by which the times of animations are told.
+    pub fps: FrameRate,
+}
 
 #[derive(Default, Deserialize)]
 #[serde(rename = "Film", default, deny_unknown_fields)]
 struct FilmFields {
     width: Option<PixelCount>,
     height: Option<PixelCount>,
+    fps: FrameRate,
 }
 
 impl TryFrom<FilmFields> for Film {
@@ -65,7 +71,8 @@ impl TryFrom<FilmFields> for Film {
         let default = FilmSize::default();
         let width = fields.width.map_or(default.width, PixelCount::get);
         let height = fields.height.map_or(default.height, PixelCount::get);
-        FilmSize::new(width, height).map(Self)
+        let fps = fields.fps;
+        FilmSize::new(width, height).map(|size| Self { size, fps })
     }
 }
 

@@ -96,6 +96,11 @@ checked_number!(
     "a frame is a number from 0 to 1e7"
 );
 checked_number!(
+    /// Frames per second.
+    FrameRate, |x| x > 0.0 && x <= 1e4,
+    "a frame rate is a number of frames per second above 0 and up to 10000"
+);
+checked_number!(
     /// Half-angle of a cone in degrees.
     ConeAngle, |x| (0.0..=90.0).contains(&x),
     "the half-angle of a cone lies from 0 to 90 degrees"
@@ -128,6 +133,7 @@ macro_rules! default_number {
 
 default_number!(Coordinate, 0.0);
 default_number!(Factor, 1.0);
+default_number!(FrameRate, 24.0);
 default_number!(Degrees, 0.0);
 default_number!(Stops, 0.0);
 default_number!(TargetError, 0.03);

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a failing test panics")]
 
 mod accessors;
+mod animations;
 mod files;
 mod geometry;
 mod hostile;
