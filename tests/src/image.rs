@@ -33,6 +33,7 @@ pub fn mean(image: &tyndall_render::image::Image, layer: &str) -> f64 {
 }
 
 /// The channels of an EXR file by name, and its width and height.
+#[derive(Debug, PartialEq)]
 pub struct Channels {
     /// Width and height in pixels.
     pub size: [usize; 2],

@@ -215,8 +215,9 @@ fn layers_about_records_agree_with_the_statistics() {
             serde_json::from_slice(&fs::read(folder.path().join("stats.json")).unwrap()).unwrap();
         let kinds = stats["records"].as_object().unwrap().values();
         let n_records: u64 = kinds.map(|n| n.as_u64().unwrap()).sum();
-        // Whole numbers, and halves from two samples a pixel: sums are exact.
-        assert_eq!(records.iter().sum::<f32>(), n_records as f32, "{method}");
+        // Most are in sight: few have moved out of the frame or behind a block. Whole numbers, whose sums are exact.
+        let shown = records.iter().sum::<f32>() / n_records as f32;
+        assert!((0.8..=1.0).contains(&shown), "{method}: {shown}");
         let n_lookups = stats["lookups"].as_u64().unwrap();
         assert_eq!(
             2.0 * lookups.iter().sum::<f32>(),

@@ -51,6 +51,9 @@
 //! with respect to moving the point, in units of value per unit of length. Signed quantities have
 //! no logarithm and do not fit.
 //!
+//! # Keeping records
+//! With the feature `serde`, records can be stored and sent; [`Cache::insert_tagged`] checks them and builds the index anew.
+//!
 //! # Sameness
 //! A lookup's bits depend on the records and their order alone, not on batches, threads or earlier lookups.
 

@@ -12,16 +12,20 @@ pub(crate) const MAX_RADIUS: f32 = 1.0 / f32::MIN_POSITIVE;
 
 /// The field as it was found at one point: `N` channels with their gradients.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Record<const N: usize> {
     /// Where the field was sampled, in the units of your world.
     pub position: Vec3,
     /// How far from `position` the record is trusted, in the same units; above 0.
     pub radius: f32,
     /// The field's value per channel; 0 or above.
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     pub value: [f32; N],
     /// How each channel's value changes as the point moves: units of value per unit of length.
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     pub gradient: [Vec3; N],
     /// Variance of the noise in each channel's value, in units of value squared; 0 for exact values.
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     pub variance: [f32; N],
 }
 

@@ -3,6 +3,7 @@
 use crate::value;
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Duration;
 use tyndall_render::layers::LayerSet;
@@ -26,7 +27,7 @@ pub(crate) enum Command {
     Probe(ProbeArgs),
     /// Tell how far an image is from a reference.
     Compare(CompareArgs),
-    /// Tell what a scene or an image holds.
+    /// Tell what a scene, an image or a cache file holds.
     Info(InfoArgs),
     /// Run the built-in exact benchmarks on this machine.
     Verify(VerifyArgs),
@@ -36,7 +37,8 @@ pub(crate) enum Command {
 pub(crate) struct RenderArgs {
     /// Scene file (.ron), or a glTF file (.glb, .gltf) together with --fog.
     pub(crate) scene: PathBuf,
-    /// Image to write: .exr (float, linear, all layers) or .png (exposed, sRGB); may be given several times.
+    /// Image to write: .exr (float, linear, all layers) or .png (exposed, sRGB); may be given several times. With --frames, #### stands
+    /// for the frame's number.
     /// Without it, an EXR file named after the scene is written to the current folder.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Vec<PathBuf>,
@@ -89,12 +91,18 @@ pub(crate) struct RenderArgs {
     /// Layers to write: beauty, surface, single, multiple, emission, transmittance, depth, records, radius, lookups, samples.
     #[arg(long, value_name = "LIST", value_parser = value::layers)]
     pub(crate) layers: Option<LayerSet>,
+    /// Render these frames of a moving camera, as in 0..48 (without the last) or 0..=47; one filling serves them all.
+    #[arg(long, value_name = "A..B", value_parser = value::frames, allow_hyphen_values = true)]
+    pub(crate) frames: Option<Range<u32>>,
     /// Start from the records kept in this file.
     #[arg(long, value_name = "F")]
     pub(crate) cache_in: Option<PathBuf>,
     /// Keep the records in this file.
     #[arg(long, value_name = "F")]
     pub(crate) cache_out: Option<PathBuf>,
+    /// Compute and keep the records, and make no image.
+    #[arg(long, requires = "cache_out", conflicts_with_all = ["output", "stats"])]
+    pub(crate) fill_only: bool,
     /// Write times, counts and the estimated error as JSON.
     #[arg(long, value_name = "F.json")]
     pub(crate) stats: Option<PathBuf>,
@@ -166,7 +174,7 @@ pub(crate) struct CompareArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct InfoArgs {
-    /// Scene (.ron, .glb, .gltf) or image (.exr, .png, .hdr, .jpg).
+    /// Scene (.ron, .glb, .gltf), image (.exr, .png, .hdr, .jpg) or cache file.
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) source: SourceArgs,

@@ -2,7 +2,7 @@
 
 use tyndall_render::error::RenderError;
 use tyndall_render::probe::ProbeError;
-use tyndall_scene::SceneError;
+use tyndall_scene::{FrameError, SceneError};
 
 /// Why the command could not do what it was asked.
 #[derive(Debug, thiserror::Error)]
@@ -13,6 +13,9 @@ pub(crate) enum CliError {
     /// A render, a comparison or an image file failed.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// A camera has no view at a frame.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// A probe was asked what has no answer.
     #[error(transparent)]
     Probe(#[from] ProbeError),
@@ -34,9 +37,17 @@ pub(crate) enum CliError {
         /// The output.
         path: std::path::PathBuf,
     },
+    /// Frames that would all go to one file.
+    #[error(
+        "{path} would hold every frame in turn: put #### into its name, where the frame's number is to stand, as in out.####.exr", path = path.display()
+    )]
+    OneFileForFrames {
+        /// The output.
+        path: std::path::PathBuf,
+    },
     /// `tyndall info` was given a file of a kind it does not know.
     #[error(
-        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images)"
+        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images), unless it is a cache file"
     )]
     UnknownKind {
         /// The file.
@@ -55,7 +66,9 @@ impl CliError {
     pub(crate) fn status(&self) -> u8 {
         match self {
             Self::Scene(_)
+            | Self::Frame(_)
             | Self::Probe(_)
+            | Self::OneFileForFrames { .. }
             | Self::UnknownKind { .. }
             | Self::Overwrites { .. } => 2,
             Self::Render(error) if error.is_input() => 2,

@@ -6,6 +6,7 @@ mod args;
 mod commands;
 mod error;
 mod failure;
+mod numbered;
 mod output;
 mod progress;
 mod value;

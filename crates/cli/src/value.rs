@@ -2,6 +2,7 @@
 //!
 //! Each function says what is allowed; clap puts the option and what was found in front.
 
+use std::ops::Range;
 use std::time::Duration;
 use tyndall_render::error::RenderError;
 use tyndall_render::layers::LayerSet;
@@ -46,6 +47,20 @@ pub(crate) fn crop(text: &str) -> Result<Crop, String> {
 /// A path depth, or `none`.
 pub(crate) fn depth(text: &str) -> Result<Depth, String> {
     text.parse().map_err(allowed)
+}
+
+/// Numbers of frames, `A..B` without B or `A..=B` with it.
+pub(crate) fn frames(text: &str) -> Result<Range<u32>, String> {
+    let range = text.split_once("..").and_then(|(first, end)| {
+        let first: u32 = first.trim().parse().ok()?;
+        let end = match end.strip_prefix('=') {
+            Some(last) => last.trim().parse::<u32>().ok()?.checked_add(1)?,
+            None => end.trim().parse().ok()?,
+        };
+        Some(first..end)
+    });
+    let range = range.filter(|range| !range.is_empty());
+    range.ok_or_else(|| "frames A..B with A below B are wanted, as in 0..48".to_owned())
 }
 
 /// A list of layers.

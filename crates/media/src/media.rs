@@ -66,7 +66,11 @@ impl Media {
     /// Optical depth between `a` and `b` with its gradients with respect to moving either point.
     ///
     /// Exact, with the motion of region boundaries along the segment; see [`EndGradients`]. Zero where the points coincide.
+    #[inline]
     pub fn optical_depth_gradient(&self, a: Vec3, b: Vec3) -> EndGradients {
+        if self.list.is_empty() {
+            return EndGradients::default();
+        }
         gradient::of_ends(&self.list, a.as_dvec3(), b.as_dvec3())
     }
 

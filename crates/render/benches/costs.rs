@@ -88,7 +88,7 @@ fn rays(scene: &Scene) -> Vec<Ray> {
 /// A field of what 20 000 walks found.
 fn field(scene: &Scene) -> Field {
     let world = scene.world();
-    let widths = CellWidths::around(scene.camera.eye(), 1.0 / 24.0, 1e-4);
+    let widths = CellWidths::around(&[scene.camera.eye()], 1.0 / 24.0, 1e-4);
     let mut found = Vec::new();
     for walk in 0..20_000 {
         let mut u = sampler(1, walk);

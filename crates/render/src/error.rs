@@ -4,7 +4,7 @@
 
 use crate::layers::known_layers;
 use std::path::PathBuf;
-use tyndall_scene::FilmSizeError;
+use tyndall_scene::{FilmSizeError, SceneError};
 
 /// Errors of this crate; the text says what, where, what is allowed and what would mend it.
 #[derive(Debug, thiserror::Error)]
@@ -101,6 +101,20 @@ pub enum RenderError {
         /// What went wrong.
         reason: String,
     },
+    /// A cache file that cannot be used.
+    #[error("{fault}: {}", path.display())]
+    Cache {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: CacheFault,
+    },
+    /// A file of the scene that could be read when the scene was loaded, and no longer can.
+    #[error(transparent)]
+    Scene {
+        /// What the scene says.
+        source: Box<SceneError>,
+    },
     /// An image without the layer that a comparison asks for.
     #[error("image {image} has no layer `{layer}`; its channels are {found}")]
     MissingLayer {
@@ -120,6 +134,77 @@ pub enum RenderError {
         a: [usize; 3],
         /// Width, height and number of channels of the other.
         b: [usize; 3],
+    },
+}
+
+/// Why a cache file cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CacheFault {
+    /// The system does not give it.
+    #[error("cannot read the cache file ({reason})")]
+    Unreadable {
+        /// What the system said.
+        reason: String,
+    },
+    /// Something else.
+    #[error("this is not a cache file that `tyndall render --cache-out` wrote")]
+    NotACache,
+    /// Written by a program of another time.
+    #[error(
+        "the cache file has version {found}, and this program reads version {known}; make it anew with --cache-out"
+    )]
+    OtherVersion {
+        /// The file's version.
+        found: u64,
+        /// The version that can be read.
+        known: u32,
+    },
+    /// Its end is missing.
+    #[error(
+        "the cache file is cut short: {found} of {wanted} bytes are there; copy it again or make it anew with --cache-out"
+    )]
+    Truncated {
+        /// Bytes of the file.
+        found: u64,
+        /// Bytes it should have.
+        wanted: u64,
+    },
+    /// Its checksum is not that of its bytes.
+    #[error(
+        "the cache file is damaged: its checksum does not fit; copy it again or make it anew with --cache-out"
+    )]
+    Damaged,
+    /// Whole, and yet not what this program writes.
+    #[error("the cache file holds no cache ({reason}); make it anew with --cache-out")]
+    Contents {
+        /// What does not fit.
+        reason: String,
+    },
+    /// Light of another scene.
+    #[error(
+        "the cache file was made for another scene: geometry, materials, lights or media differ; make it anew with --cache-out"
+    )]
+    OtherScene,
+    /// Light that scatters more or less often.
+    #[error(
+        "the cache file was made with --max-depth {found}, and {wanted} is asked for now; make it anew with --cache-out"
+    )]
+    OtherDepth {
+        /// The file's.
+        found: String,
+        /// The render's.
+        wanted: String,
+    },
+    /// Records of another kind.
+    #[error(
+        "the cache file was made with --method {found}, and {wanted} is asked for now; make it anew with --cache-out"
+    )]
+    OtherMethod {
+        /// The file's.
+        found: &'static str,
+        /// The render's.
+        wanted: &'static str,
     },
 }
 

@@ -6,7 +6,6 @@
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::layers::{LAYERS, Layer, LayerSet, Source};
-use crate::noise::Noise;
 use crate::options::Crop;
 use crate::relative::{mean, median_5x5, weighted, weights};
 use glam::{DVec3, Vec3};
@@ -123,6 +122,16 @@ impl Film {
         .collect()
     }
 
+    /// Number of pixels.
+    pub(crate) fn len(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// Whether some pixels have no samples.
+    pub(crate) fn has_gaps(&self) -> bool {
+        self.counts.contains(&[0, 0])
+    }
+
     /// Mean number of samples per pixel.
     pub fn mean_samples(&self) -> f64 {
         let total: u64 = self.counts.iter().flatten().map(|&n| u64::from(n)).sum();
@@ -153,11 +162,24 @@ impl Film {
         image
     }
 
-    /// Gives rows without any sample the sums of the nearest row that has some, as where time ran out in the first pass.
+    /// Takes over the samples of another film of the same frame and layers, where it shows pixels of this one.
+    pub(crate) fn adopt(&mut self, other: &Self) {
+        let (mine, theirs) = (self.crop, other.crop);
+        for i in 0..other.counts.len() {
+            let (x, y) = (i as u32 % theirs.width, i as u32 / theirs.width);
+            if let Some(to) = mine.index([theirs.x + x, theirs.y + y]) {
+                self.counts[to] = other.counts[i];
+                let sums = &other.sums[i * other.stride..(i + 1) * other.stride];
+                self.sums[to * self.stride..(to + 1) * self.stride].copy_from_slice(sums);
+            }
+        }
+    }
+
+    /// Gives rows with gaps the sums of the nearest row without, as where time ran out in the first pass.
     pub fn fill_gaps(&mut self) {
         let width = self.crop.width as usize;
         let sampled: Vec<usize> = (0..self.crop.height as usize)
-            .filter(|row| self.counts[row * width] != [0, 0])
+            .filter(|row| !self.counts[row * width..][..width].contains(&[0, 0]))
             .collect();
         for row in 0..self.crop.height as usize {
             let nearest = sampled
@@ -179,12 +201,17 @@ impl Film {
         std::array::from_fn(|c| self.beauty(c))
     }
 
-    /// What the two halves tell of the image's noise: what each pixel adds to the squared error is V w, where
+    /// Samples of pixel number `i` in reading order.
+    pub(crate) fn taken(&self, i: usize) -> u32 {
+        self.counts[i].iter().sum()
+    }
+
+    /// What the two halves tell of the image's noise: the root of the mean over pixels of V w, where
     /// V = (a − b)² n m / (n + m)² estimates the variance of a pixel's value from the means a, b of its n even and m odd samples
     /// (((a − b)/2)² for halves of one size), and w is the weight of the relative error at the image's 5 × 5 median.
     ///
-    /// `None` until every pixel has two samples. Unbiased where the samples of the two halves are independent.
-    pub fn noise(&self) -> Option<Noise> {
+    /// `None` until every pixel has two samples. Unbiased, before the root, where the samples of the two halves are independent.
+    pub fn relative_error(&self) -> Option<f64> {
         if self.counts.iter().any(|n| n[0] == 0 || n[1] == 0) {
             return None;
         }
@@ -200,16 +227,17 @@ impl Film {
                 .sum::<f64>()
                 / 3.0
         });
-        Some(Noise {
-            width,
-            squared: squared.collect(),
-            taken: self.counts.iter().map(|[n, m]| n + m).collect(),
-        })
+        Some((squared.sum::<f64>() / self.counts.len() as f64).sqrt())
     }
 
-    /// Estimated error of the image so far, as far as noise goes; see [`Film::noise`].
-    pub fn relative_error(&self) -> Option<f64> {
-        Some(self.noise()?.error())
+    /// Estimated variance of one sample of pixel number `i` in reading order, per channel; 0 where the pixel lacks samples in either half.
+    pub(crate) fn sample_variance(&self, i: usize) -> DVec3 {
+        let n = self.counts[i];
+        if n[0] == 0 || n[1] == 0 {
+            return DVec3::ZERO;
+        }
+        let sums = &self.sums[i * self.stride..(i + 1) * self.stride];
+        self.variance(sums, n) * f64::from(n[0] + n[1])
     }
 
     /// Estimated variance of a pixel's colour from its two halves.
@@ -225,19 +253,22 @@ impl Film {
         difference * difference * (n_a * n_b / (n_a + n_b).powi(2))
     }
 
-    /// One channel of the image's colour: the f32 sum of its layers' f32 values.
+    /// One channel of the image's colour.
     fn beauty(&self, c: usize) -> Vec<f32> {
-        let mut total = vec![0.0; self.counts.len()];
-        for s in self
+        (0..self.counts.len())
+            .map(|i| self.beauty_at(i, c))
+            .collect()
+    }
+
+    /// One channel of a pixel's colour: the f32 sum of its layers' f32 values.
+    fn beauty_at(&self, i: usize, c: usize) -> f32 {
+        let sums = &self.sums[i * self.stride..];
+        let n = f64::from(self.taken(i).max(1));
+        let parts = self
             .stored
             .iter()
-            .filter(|s| matches!(s.layer.source, Source::PartOfBeauty(_)))
-        {
-            for (total, value) in total.iter_mut().zip(self.mean(s.first + c)) {
-                *total += value;
-            }
-        }
-        total
+            .filter(|s| matches!(s.layer.source, Source::PartOfBeauty(_)));
+        parts.map(|s| (sums[s.first + c] / n) as f32).sum()
     }
 
     fn stored_mean(&self, layer: &Layer, c: usize) -> Vec<f32> {

@@ -56,6 +56,18 @@ impl Image {
             })
     }
 
+    /// The layer that is shown as a picture, brightened by `exposure` stops: sRGB codes of red, green and blue, pixel by pixel; `None` where
+    /// there are no channels.
+    pub fn srgb(&self, exposure: f32) -> Option<Vec<u8>> {
+        let layer = self.shown_layer()?;
+        let grey = *layer.first()?;
+        let [red, green, blue] = [0, 1, 2].map(|c| *layer.get(c).unwrap_or(&grey));
+        let scale = exposure.exp2();
+        let code = |linear: &f32| (srgb_from_linear(linear * scale) * 255.0).round() as u8;
+        let pixels = red.iter().zip(green).zip(blue);
+        Some(pixels.flat_map(|((r, g), b)| [r, g, b].map(code)).collect())
+    }
+
     /// The layer a picture of this image shows: the first of the table that it holds, else its first channel.
     pub fn shown_layer(&self) -> Option<Vec<&[f32]>> {
         LAYERS

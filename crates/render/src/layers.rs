@@ -44,7 +44,7 @@ pub enum Source {
     Mean(fn(&Pixel) -> Vec3),
     /// The number of samples taken.
     SampleCount,
-    /// The cache records asked for through the pixel, as they were when the cache was filled.
+    /// The cache records seen through the pixel.
     Records,
 }
 
@@ -105,14 +105,14 @@ pub static LAYERS: &[Layer] = &[
         name: "records",
         channels: &["records"],
         presence: Presence::Asked,
-        about: "cache records asked for through the pixel, number",
+        about: "cache records seen through the pixel, number",
         source: Source::Records,
     },
     Layer {
         name: "radius",
         channels: &["radius"],
         presence: Presence::Asked,
-        about: "mean radius of the cache records asked for through the pixel, m; 0 where there are none",
+        about: "mean radius of the cache records seen through the pixel, m; 0 where there are none",
         source: Source::Records,
     },
     Layer {

@@ -1,9 +1,10 @@
 //! From a scene to an image: volumetric radiance caching and path tracing, the film, its layers, and image files.
 //!
 //! [`render`](render()) does it all: it starts the threads, fills the caches of multiple scattering and of indirect light on surfaces, takes
-//! camera samples until the image is as good as was asked, and gives back the image with what it cost. Three types to know:
+//! camera samples until the image is as good as was asked, and gives back the image with what it cost. Four types to know:
 //!
 //! * [`RenderOptions`](options::RenderOptions): what is asked; the default leaves each choice to the scene file;
+//! * [`Renderer`]: as [`render`](render()) for frames that share what is computed ahead of them, and its cache files;
 //! * [`Outcome`]: the [`Image`](image::Image), its [`Stats`](stats::Stats), and what the user should be told;
 //! * [`RenderError`](error::RenderError): one readable paragraph about what is wrong.
 //!
@@ -66,4 +67,4 @@ pub mod relative;
 pub mod stats;
 pub mod verify;
 
-pub use integrator::{Outcome, render};
+pub use integrator::{CacheInfo, Outcome, Renderer, render};

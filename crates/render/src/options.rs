@@ -4,6 +4,7 @@
 
 use crate::error::RenderError;
 use crate::layers::LayerSet;
+use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -63,13 +64,23 @@ pub enum SingleFrom {
 }
 
 /// What kind of records radiance caching uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Method {
     /// This project's: gather rays end in a coarse field, gradients and radii know of what stands around, single scattering is sampled.
     #[default]
     Tyndall,
     /// The algorithm as published by Jarosz, Donner, Zwicker and Jensen in 2008: a baseline to compare with.
     Jarosz08,
+}
+
+impl Method {
+    /// As the command line spells it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tyndall => "tyndall",
+            Self::Jarosz08 => "jarosz08",
+        }
+    }
 }
 
 /// How often light may scatter, in media or at surfaces, between light and eye.
@@ -122,6 +133,13 @@ impl Crop {
             width,
             height,
         }
+    }
+
+    /// The place of a pixel, column and row, among those of the crop in reading order.
+    pub fn index(&self, [x, y]: [u32; 2]) -> Option<usize> {
+        let (x, y) = (x.checked_sub(self.x)?, y.checked_sub(self.y)?);
+        let is_inside = x < self.width && y < self.height;
+        is_inside.then_some(y as usize * self.width as usize + x as usize)
     }
 
     /// This crop, if it lies within the frame.

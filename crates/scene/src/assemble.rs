@@ -3,6 +3,7 @@
 //! Whatever refers to another file, or can be judged only beside other things, is checked here; errors name the field.
 
 use crate::camera::Camera;
+use crate::digest;
 use crate::error::{SceneError, Warning};
 use crate::film::FilmSize;
 use crate::gltf::{self, AnimatedCamera, GltfCamera, GltfScene, PunctualLight};
@@ -74,6 +75,7 @@ impl Assembly<'_> {
             lights,
             media,
             bounds,
+            definition: digest::definition(file, self.options),
             warnings: self.warnings,
             files: self.files,
         })

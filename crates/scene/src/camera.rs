@@ -4,13 +4,14 @@
 //! positions far from the origin lose digits; rays are f32.
 
 use glam::{Affine3A, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use tyndall_math::{Aabb, Ray};
 
 /// Vertical field of view when a view frames the scene by itself, in radians (40°).
 const FRAMING_YFOV: f32 = 0.698_131_7;
 
 /// A pinhole camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Camera {
     eye: Vec3,
     forward: Vec3,
@@ -161,6 +162,18 @@ impl Camera {
         Ray::new(self.eye, direction.normalize())
     }
 
+    /// Where the point `p` is seen in such an image, as [`Camera::ray`] counts, within its borders or beyond; `None` for points that are
+    /// not in front of the eye.
+    pub fn project(&self, p: Vec3, width: u32, height: u32) -> Option<[f32; 2]> {
+        let way = p - self.eye;
+        let depth = way.dot(self.forward);
+        let half_heights = |axis: Vec3| way.dot(axis) / (depth * axis.length_squared());
+        let (width, height) = (width as f32, height as f32);
+        let x = 0.5 * (width + height * half_heights(self.right));
+        let y = 0.5 * height * (1.0 - half_heights(self.up));
+        (depth > 0.0 && x.is_finite() && y.is_finite()).then_some([x, y])
+    }
+
     /// Width of a pixel in metres at `distance` metres from the eye, for an image `height` pixels high: 2 d tan(yfov/2) / height.
     /// Exact at the image's centre; pixels further out see a little less.
     pub fn footprint(&self, distance: f32, height: u32) -> f32 {
@@ -190,6 +203,20 @@ mod tests {
     fn close(a: Vec3, b: Vec3) {
         // Rounding of a normalised f32 direction.
         assert!((a - b).length() < 1e-6, "{a} {b}");
+    }
+
+    #[test]
+    fn points_are_seen_where_the_rays_through_their_pixels_meet_them() {
+        let eye = Vec3::new(1.0, 2.0, 3.0);
+        let camera = Camera::look_at(eye, Vec3::ZERO, Vec3::new(0.3, 1.0, 0.0), FRAC_PI_2).unwrap();
+        for (x, y, t) in [(0.5, 0.5, 1.0), (100.0, 50.0, 7.0), (180.25, -20.0, 0.1)] {
+            let p = camera.ray(x, y, 200, 100).at(t);
+            let [u, v] = camera.project(p, 200, 100).unwrap();
+            // Pixels of an image 200 wide; rounding of f32 grows as 1/t.
+            assert!((u - x).abs() < 2e-3 && (v - y).abs() < 2e-3, "{u} {v}");
+        }
+        assert_eq!(camera.project(eye + eye, 200, 100), None, "behind");
+        assert_eq!(camera.project(eye, 200, 100), None, "at the eye");
     }
 
     #[test]

@@ -40,6 +40,7 @@
 mod assemble;
 pub mod camera;
 pub mod camera_path;
+mod digest;
 pub mod error;
 pub mod film;
 pub mod gltf;

@@ -36,6 +36,8 @@ pub struct Scene {
     pub warnings: Vec<Warning>,
     /// The files that the scene was read from.
     pub files: Vec<PathBuf>,
+    /// What the scene file says of lights and media; see [`Scene::digest`].
+    pub(crate) definition: String,
 }
 
 /// What a scene file asks of the renderer; the command line may ask otherwise.

@@ -4,13 +4,14 @@
 
 use crate::world::SurfaceHit;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Hits count as on a plane within this share of their distance, where their normals differ by less than 2.6°.
 const COPLANAR: f32 = 1e-3;
 const SAME_NORMAL: f32 = 0.999;
 
 /// The half-space in front of a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     normal: Vec3,
     offset: f32,
@@ -41,7 +42,7 @@ impl Plane {
 }
 
 /// The nearest surfaces around a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Walls {
     planes: [Plane; 2],
     /// Distance in metres to the nearest surface that is in neither plane; infinite where there is none.

@@ -1,9 +1,10 @@
-//! `tyndall info`: what a scene or an image holds.
+//! `tyndall info`: what a scene, an image or a cache file holds.
 
 use super::not_built;
 use crate::args::InfoArgs;
 use crate::error::CliError;
 use crate::output;
+use tyndall_render::CacheInfo;
 use tyndall_render::image_file::read_image;
 use tyndall_render::info::{ImageInfo, LightInfo, SceneInfo};
 use tyndall_scene::LoadOptions;
@@ -43,6 +44,14 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
             "reading volume files",
             "describe the fog by Constant or Height density in a scene file",
         )),
+        _ if CacheInfo::is_cache(&args.file) => {
+            let cache = CacheInfo::of(&args.file)?;
+            if args.json {
+                output::print_json(&cache)
+            } else {
+                output::print(&cache_text(&cache))
+            }
+        }
         _ => Err(CliError::UnknownKind {
             path: args.file.display().to_string(),
         }),
@@ -147,6 +156,46 @@ fn image_text(image: &ImageInfo) -> String {
         lines.push(format!(
             "{name:<width$}  min {min}  mean {mean}  max {max}  nan {}  inf {}",
             c.nan, c.inf
+        ));
+    }
+    lines.join("\n")
+}
+
+fn cache_text(cache: &CacheInfo) -> String {
+    let depth = cache.max_depth.map_or("none".to_owned(), |n| n.to_string());
+    let mut lines = vec![
+        format!(
+            "cache      for an error of {:.2} %, max depth {depth}, method {}",
+            100.0 * cache.error,
+            cache.method
+        ),
+        format!("views      {}", cache.views),
+        format!(
+            "field      {} cells{}",
+            cache.field_cells,
+            if cache.reads_field {
+                ", read for multiple scattering"
+            } else {
+                ""
+            }
+        ),
+        format!("memory     {:.1} MiB", cache.mib),
+    ];
+    for (kind, records) in &cache.records {
+        let radii = records
+            .radius_m
+            .map_or(String::new(), |[min, median, max]| {
+                format!(", radii {min:.4} to {max:.4} m (median {median:.4})")
+            });
+        let noise = records.relative_noise.map_or(String::new(), |noise| {
+            format!(", noise {:.2} % (median)", 100.0 * noise)
+        });
+        let error = records.error.map_or(String::new(), |error| {
+            format!(", {:.2} % of the image's error", 100.0 * error)
+        });
+        lines.push(format!(
+            "records    {} {kind}{radii}{noise}{error}",
+            records.count
         ));
     }
     lines.join("\n")

@@ -1,8 +1,8 @@
 //! `tyndall render`: from a scene file to image files.
 
-use super::not_built;
 use crate::args::RenderArgs;
 use crate::error::CliError;
+use crate::numbered::{has_place, numbered};
 use crate::output;
 use crate::progress::Bar;
 use std::path::{Path, PathBuf};
@@ -11,28 +11,35 @@ use tyndall_render::image_file::{
     ImageFormat, WriteOptions, check_place, check_writable, write_image,
 };
 use tyndall_render::options::RenderOptions;
-use tyndall_render::{Outcome, render};
-use tyndall_scene::LoadOptions;
+use tyndall_render::{Outcome, Renderer};
+use tyndall_scene::camera::Camera;
+use tyndall_scene::{LoadOptions, Scene};
 
 pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     let start = Instant::now();
-    if args.cache_in.is_some() || args.cache_out.is_some() {
-        return Err(not_built(
-            "keeping records in a file (--cache-in, --cache-out)",
-            "leave the option out: records are computed anew",
-        ));
-    }
     let options = render_options(args);
     options.check()?;
     let outputs = outputs(args);
-    for path in &outputs {
+    let jobs = jobs(args, &outputs)?;
+    for path in jobs.iter().flat_map(|job| &job.outputs) {
         check_writable(path)?;
     }
-    if let Some(path) = &args.stats {
+    let numbers = jobs.iter().filter_map(|job| job.stats.as_ref());
+    for path in numbers.chain(&args.cache_out) {
         check_place(path)?;
     }
     let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
-    apart(&scene.files, outputs.iter().chain(&args.stats))?;
+    let kept = args
+        .cache_out
+        .iter()
+        .filter(|&path| args.cache_in.as_ref() != Some(path));
+    let written = jobs
+        .iter()
+        .flat_map(|job| job.outputs.iter().chain(&job.stats));
+    apart(
+        scene.files.iter().chain(&args.cache_in),
+        written.chain(kept),
+    )?;
     output::warn(&scene.warnings);
     let shows_colour_alone = |path: &PathBuf| matches!(ImageFormat::of(path), Ok(ImageFormat::Png));
     if args.layers.is_some() && outputs.iter().any(shows_colour_alone) {
@@ -43,58 +50,135 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     let load_s = start.elapsed().as_secs_f64();
 
     let bar = Bar::new(args.quiet);
-    let outcome = render(&scene, &options, &bar);
-    bar.finish();
-    let mut outcome = outcome?;
-    output::warn(&outcome.notes);
-
-    let write = WriteOptions {
-        exposure: scene.settings.exposure,
-        metadata: Some(metadata(args, &outcome)),
-    };
-    for path in &outputs {
-        write_image(path, &outcome.image, &write)?;
+    let mut renderer = Renderer::new(&scene, &options, &bar)?;
+    if let Some(path) = &args.cache_in {
+        renderer.read_cache(path)?;
     }
-    outcome.stats.load_s = load_s;
-    outcome.stats.wall_s = start.elapsed().as_secs_f64();
-    if let Some(path) = &args.stats {
-        outcome.stats.write(path)?;
+    let cameras: Vec<Camera> = jobs
+        .iter()
+        .map(|job| camera(&scene, job))
+        .collect::<Result<_, CliError>>()?;
+    if args.fill_only || args.frames.is_some() || args.cache_out.is_some() {
+        renderer.fill(&cameras);
     }
-    if !args.quiet {
-        let stats = &outcome.stats;
-        output::say(&outcome.summary);
-        output::say(&format!(
-            "{:.1} s on {} threads, {:.1} samples per pixel",
-            stats.wall_s, stats.threads, stats.spp
-        ));
-        if let Some(error) = &stats.estimated_error {
-            // Few samples may give an estimate of the squared error below 0: all that is known then is the bound.
-            let value = if error.value > 0.0 {
-                format!("{:.2} %", 100.0 * error.value)
-            } else {
-                "too small to tell".to_owned()
-            };
-            output::say(&format!(
-                "estimated error {value} (95 %: {:.2} to {:.2} %), bias {:+.2} %",
-                100.0 * error.ci95[0],
-                100.0 * error.ci95[1],
-                100.0 * error.bias
-            ));
-        }
-        for path in &outputs {
+    if let Some(path) = &args.cache_out {
+        renderer.write_cache(path)?;
+        if !args.quiet {
             output::say(&format!("wrote {}", path.display()));
         }
+    }
+    if args.fill_only {
+        bar.finish();
+        return Ok(());
+    }
+    let mut since = start;
+    for (job, camera) in jobs.iter().zip(&cameras) {
+        let outcome = renderer.render(camera, job.number.unwrap_or(0));
+        bar.finish();
+        let mut outcome = outcome?;
+        outcome.stats.load_s = if since == start { load_s } else { 0.0 };
+        finish(args, &scene, job, &mut outcome, since)?;
+        since = Instant::now();
+    }
+    Ok(())
+}
+
+/// One image, and where it goes.
+struct Job {
+    /// Of a frame; none for a still.
+    number: Option<u32>,
+    outputs: Vec<PathBuf>,
+    stats: Option<PathBuf>,
+}
+
+/// The images to make: one, or one a frame.
+fn jobs(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Vec<Job>, CliError> {
+    let Some(frames) = &args.frames else {
+        return Ok(vec![Job {
+            number: None,
+            outputs: outputs.to_vec(),
+            stats: args.stats.clone(),
+        }]);
+    };
+    let mut paths = outputs.iter().chain(&args.stats);
+    if let Some(path) = paths
+        .find(|path| !has_place(path))
+        .filter(|_| frames.len() > 1)
+    {
+        return Err(CliError::OneFileForFrames { path: path.clone() });
+    }
+    let job = |number| Job {
+        number: Some(number),
+        outputs: outputs.iter().map(|path| numbered(path, number)).collect(),
+        stats: args.stats.as_ref().map(|path| numbered(path, number)),
+    };
+    Ok(frames.clone().map(job).collect())
+}
+
+/// From where a job's image is seen.
+fn camera(scene: &Scene, job: &Job) -> Result<Camera, CliError> {
+    match job.number {
+        None => Ok(scene.camera),
+        Some(number) => Ok(scene.camera_at(number as f32)?),
+    }
+}
+
+/// Writes an image and tells about it.
+fn finish(
+    args: &RenderArgs,
+    scene: &Scene,
+    job: &Job,
+    outcome: &mut Outcome,
+    since: Instant,
+) -> Result<(), CliError> {
+    output::warn(&outcome.notes);
+    let write = WriteOptions {
+        exposure: scene.settings.exposure,
+        metadata: Some(metadata(args, outcome)),
+    };
+    for path in &job.outputs {
+        write_image(path, &outcome.image, &write)?;
+    }
+    outcome.stats.wall_s = since.elapsed().as_secs_f64();
+    if let Some(path) = &job.stats {
+        outcome.stats.write(path)?;
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    let stats = &outcome.stats;
+    output::say(&outcome.summary);
+    output::say(&format!(
+        "{:.1} s on {} threads, {:.1} samples per pixel",
+        stats.wall_s, stats.threads, stats.spp
+    ));
+    if let Some(error) = &stats.estimated_error {
+        // Few samples may give an estimate of the squared error below 0: all that is known then is the bound.
+        let value = if error.value > 0.0 {
+            format!("{:.2} %", 100.0 * error.value)
+        } else {
+            "too small to tell".to_owned()
+        };
+        output::say(&format!(
+            "estimated error {value} (95 %: {:.2} to {:.2} %), bias {:+.2} %",
+            100.0 * error.ci95[0],
+            100.0 * error.ci95[1],
+            100.0 * error.bias
+        ));
+    }
+    for path in &job.outputs {
+        output::say(&format!("wrote {}", path.display()));
     }
     Ok(())
 }
 
 /// Refuses outputs that would replace a file of the scene or one another.
 fn apart<'a>(
-    inputs: &[PathBuf],
+    inputs: impl Iterator<Item = &'a PathBuf>,
     outputs: impl Iterator<Item = &'a PathBuf>,
 ) -> Result<(), CliError> {
     let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let mut taken: Vec<PathBuf> = inputs.iter().map(|path| real(path)).collect();
+    let mut taken: Vec<PathBuf> = inputs.map(|path| real(path)).collect();
     for output in outputs {
         let place = real(output);
         if taken.contains(&place) {
@@ -109,11 +193,15 @@ fn apart<'a>(
 
 /// The files to write. Without a choice it is one beside the user, and not named like a scene's own images might be.
 fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
-    if !args.output.is_empty() {
+    if args.fill_only || !args.output.is_empty() {
         return args.output.clone();
     }
     let mut name = args.scene.file_stem().unwrap_or_default().to_owned();
-    name.push("-render.exr");
+    name.push(if args.frames.is_some() {
+        "-render.####.exr"
+    } else {
+        "-render.exr"
+    });
     vec![Path::new(&name).to_owned()]
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Files of 8 or 16 bits are taken as sRGB, whatever profile they name; HDR files are linear.
 
-use crate::image::{Image, linear_from_srgb, srgb_from_linear};
+use crate::image::{Image, linear_from_srgb};
 use image::{DynamicImage, ImageBuffer, ImageFormat, ImageReader, Rgb};
 use std::io::{Cursor, Seek, Write};
 
@@ -12,19 +12,7 @@ pub(super) fn write(
     image: &Image,
     exposure: f32,
 ) -> Result<(), String> {
-    let layer = image.shown_layer().ok_or("the image has no channels")?;
-    let [Some(red), Some(green), Some(blue)] = [0, 1, 2].map(|c| layer.get(c).or(layer.first()))
-    else {
-        return Err("the image has no channels".to_owned());
-    };
-    let scale = exposure.exp2();
-    let code = |linear: f32| (srgb_from_linear(linear * scale) * 255.0).round() as u8;
-    let codes = red
-        .iter()
-        .zip(*green)
-        .zip(*blue)
-        .flat_map(|((&r, &g), &b)| [code(r), code(g), code(b)])
-        .collect();
+    let codes = image.srgb(exposure).ok_or("the image has no channels")?;
     let size =
         |n: usize| u32::try_from(n).map_err(|_| "the image is too large for a PNG file".to_owned());
     ImageBuffer::<Rgb<u8>, Vec<u8>>::from_raw(size(image.width)?, size(image.height)?, codes)

@@ -5,6 +5,7 @@
 
 use super::camera::{Camera, Tally};
 use super::has_passed;
+use super::view::View;
 use crate::film::Film;
 use crate::options::{Phase, Progress};
 use crate::relative::{mean, median_5x5, weighted, weights};
@@ -30,7 +31,7 @@ const Z_95: f64 = 1.96;
 /// What is measured.
 pub(super) struct Estimate<'s> {
     pub(super) scene: &'s Scene,
-    pub(super) frame: [u32; 2],
+    pub(super) view: View,
     pub(super) max_depth: Option<u32>,
     pub(super) seed: u64,
     /// When to stop with the pixels evaluated by then.
@@ -126,7 +127,7 @@ impl Estimate<'_> {
 
     /// Evaluates the pixel in column and row `place`, whose value in the image is `x`, twice.
     fn term(&self, i: usize, place: [u32; 2], x: DVec3, w: DVec3, samples: u64) -> Term {
-        let camera = Camera::new(self.scene, self.frame, Reach::depth(self.max_depth));
+        let camera = Camera::new(self.scene, self.view, Reach::depth(self.max_depth));
         let [column, row] = place;
         let evaluate = |half: u64| {
             let key = self.key(2 * i as u64 + half);

@@ -5,8 +5,11 @@
 
 use super::counted::Counted;
 use super::has_passed;
+use super::view::{View, spread};
 use crate::options::{Phase, Progress};
+use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Sampler};
@@ -17,6 +20,8 @@ use tyndall_transport::field::{CellWidths, Field, Filling, Found};
 const WIDTH: f32 = 1.0 / 24.0;
 /// Least width of cells over the eye's coordinates.
 const LEAST_WIDTH: f32 = 1e-5;
+/// Eyes from which cells look small, at most: each read of the field looks for the nearest.
+const EYES: usize = 16;
 /// Light found at an error of 1: how much is asked for goes with the inverse square of the error.
 const FOUND_GAIN: f32 = 600.0;
 /// Least and most light found, counted by scatterings.
@@ -34,8 +39,10 @@ const BATCH: u64 = 4096;
 const PIECE: u64 = 256;
 
 /// A filled field and what it cost.
+#[derive(Clone, Deserialize, Serialize)]
 pub(super) struct FilledField {
     pub(super) field: Field,
+    #[serde(skip)]
     pub(super) rays: u64,
     /// Whether the deadline ended the filling.
     pub(super) cut_short: bool,
@@ -43,10 +50,10 @@ pub(super) struct FilledField {
     pub(super) unsure: bool,
 }
 
-/// Follows walks from the camera of `scene`, the more the smaller the `error` asked for.
+/// Follows walks from the cameras of `views`, the more the smaller the `error` asked for.
 pub(super) fn fill(
     scene: &Scene,
-    frame: [u32; 2],
+    views: &[View],
     seed: u64,
     error: f32,
     deadline: Option<Instant>,
@@ -54,10 +61,11 @@ pub(super) fn fill(
 ) -> FilledField {
     let counted = Counted::new(scene);
     let wanted = (FOUND_GAIN / (error * error)).clamp(FOUND[0], FOUND[1]) as u64;
-    let eye = scene.camera.eye();
+    let eyes: Vec<Vec3> = spread(views, EYES).map(View::eye).collect();
     // No smaller than coordinates are fine.
-    let least = (LEAST_WIDTH * eye.abs().max_element()).max(f32::MIN_POSITIVE);
-    let mut filling = Filling::new(CellWidths::around(eye, WIDTH, least));
+    let farthest = eyes.iter().map(|eye| eye.abs().max_element());
+    let least = farthest.fold(f32::MIN_POSITIVE, |least, c| least.max(LEAST_WIDTH * c));
+    let mut filling = Filling::new(CellWidths::around(&eyes, WIDTH, least));
     let (mut first, mut held) = (0, 0);
     let mut cut_short = false;
     // Light where walks scatter first: how well it is known tells whether walks find what lights the scene.
@@ -78,7 +86,8 @@ pub(super) fn fill(
                 let (mut found, mut lights) = (Vec::new(), Vec::new());
                 for walk in piece..(piece + PIECE).min(last) {
                     let held = found.len();
-                    follow(scene, &counted, frame, seed, walk, &mut found);
+                    let view = &views[(walk % views.len() as u64) as usize];
+                    follow(scene, &counted, view, seed, walk, &mut found);
                     // The first vertex of a walk is told last.
                     let light = found[held..].last().map(Found::light);
                     lights.extend(light.map(|light| f64::from(light.element_sum())));
@@ -123,7 +132,7 @@ pub(super) fn fill(
 fn follow(
     scene: &Scene,
     counted: &Counted<'_>,
-    frame: [u32; 2],
+    view: &View,
     seed: u64,
     walk: u64,
     found: &mut Vec<Found>,
@@ -134,8 +143,6 @@ fn follow(
         index: 0,
     };
     let mut sampler = Sampler::new(key, walk);
-    let [u, v] = sampler.next_2d();
-    let [w, h] = frame;
-    let ray = scene.camera.ray(u * w as f32, v * h as f32, w, h);
+    let ray = view.ray_at(sampler.next_2d());
     Filling::walk(&counted.world(scene), ray, &mut sampler, found);
 }

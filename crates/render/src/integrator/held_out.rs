@@ -8,6 +8,7 @@ use super::fill::media::{self, MediaCache};
 use super::fill::surfaces::{self, SurfaceCache};
 use super::has_passed;
 use super::pilot::{self, Pilot};
+use super::view::View;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -47,7 +48,8 @@ pub(super) enum Read<'c> {
 /// Evaluations held out from what was computed.
 pub(super) struct HeldOut<'s> {
     pub(super) scene: &'s Scene,
-    pub(super) frame: [u32; 2],
+    /// From where the image is seen.
+    pub(super) views: &'s [View],
     pub(super) seed: u64,
     pub(super) reach: Reach<'s>,
     pub(super) pilot: &'s Pilot,
@@ -93,9 +95,8 @@ impl HeldOut<'_> {
             index: HELD_OUT + KEYS * block as u64 + k,
         };
         let mut sampler = Sampler::new(key(0), 0);
-        let [x, y] = pilot::place(block as u32, sampler.next_2d());
-        let [w, h] = self.frame;
-        let ray = self.scene.camera.ray(x * w as f32, y * h as f32, w, h);
+        let place = pilot::place(block as u32, sampler.next_2d());
+        let ray = pilot::view(self.views, block).ray_at(place);
         let (hit, flight) = FreeFlight::to_surface(&world, &ray);
         if let Read::Surface(cache, sky) = read {
             let hit = hit.filter(surfaces::holds)?;

@@ -2,9 +2,11 @@
 //!
 //! What records are stands in [`fill::jarosz08`](super::fill::jarosz08); placement, lookups and film are those of the default method.
 
+use super::fill::Light;
 use super::fill::jarosz08::{Irradiance, Volume};
 use super::prepare::Prepared;
-use super::{Run, Way};
+use super::view::View;
+use super::{Run, Way, is_lit, scatters};
 use crate::options::Method;
 
 impl Run<'_> {
@@ -12,41 +14,38 @@ impl Run<'_> {
         self.options.method == Some(Method::Jarosz08)
     }
 
-    /// Fills the caches that the scene needs.
-    pub(super) fn jarosz08(&self, way: Way) -> Prepared {
-        if !self.is_lit() {
+    /// Fills the caches that the scene needs, which may be `known` for other views.
+    pub(super) fn jarosz08(&self, views: &[View], known: Prepared) -> Prepared {
+        if !is_lit(self.scene) {
             return Prepared::default();
         }
-        let (scene, frame, seed, error) = (self.scene, self.frame, self.options.seed, self.error);
-        let max_depth = self.max_depth;
+        let (scene, height) = (self.scene, self.frame[1]);
+        let (seed, error, max_depth) = (self.options.seed, self.error, self.max_depth);
         let reaches = |events| max_depth.is_none_or(|max| max >= events);
-        let has_single = self.scatters() && reaches(1);
-        let single = has_single.then(|| self.fill(Volume::single(scene, frame, seed, error)));
-        let multiple = (way == Way::Records)
-            .then(|| self.fill(Volume::multiple(scene, frame, max_depth, seed, error)));
-        let has_surfaces = !scene.geometry.is_empty() && reaches(2);
-        let surface = has_surfaces.then(|| {
-            self.fill(Irradiance {
+        let mut prepared = Prepared::default();
+        if scatters(scene) && reaches(1) {
+            let kind = Volume::single(scene, height, seed, error);
+            prepared.single = Some(self.fill(views, kind, known.single));
+            prepared.shares.push((Light::Single, None));
+        }
+        if self.way == Way::Records {
+            let kind = Volume::multiple(scene, height, max_depth, seed, error);
+            prepared.multiple = Some(self.fill(views, kind, known.multiple));
+            prepared.shares.push((Light::Multiple, None));
+        }
+        if !scene.geometry.is_empty() && reaches(2) {
+            let kind = Irradiance {
                 scene,
-                frame,
+                height,
                 max_depth,
                 seed,
                 error,
-            })
-        });
-        let unknown = [
-            ("single", single.is_some()),
-            ("multiple", multiple.is_some()),
-            ("surface", surface.is_some()),
-        ];
-        let filled = unknown.into_iter().filter(|(_, filled)| *filled);
-        Prepared {
-            shares: filled.map(|(layer, _)| (layer, None)).collect(),
-            single,
-            multiple,
-            surface,
-            ..Prepared::default()
+            };
+            prepared.surface = Some(self.fill(views, kind, known.surface));
+            prepared.shares.push((Light::Surface, None));
         }
+        prepared.views = known.views;
+        prepared
     }
 }
 

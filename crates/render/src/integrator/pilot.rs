@@ -4,10 +4,12 @@
 
 use super::camera::{Camera, Known};
 use super::has_passed;
+use super::view::View;
 use crate::film::Pixel;
 use crate::options::SingleFrom;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use tyndall_math::{Key, Purpose, Sampler};
 
@@ -40,12 +42,12 @@ pub(super) struct Pilot {
 }
 
 /// Relative errors that parts of the light may have.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(super) struct Plan {
     /// Multiple scattering.
     pub(super) multiple: f32,
     /// Single scattering of light from skies.
-    sky: f32,
+    pub(super) sky: f32,
     /// Whether there is so much of that in the image that samples do less well.
     sky_matters: bool,
     /// Light on surfaces.
@@ -59,7 +61,7 @@ impl Plan {
     const SURFACE: f32 = 0.35;
 
     /// How far off records of single-scattered light from skies may be; `None` where samples are taken instead.
-    pub(super) fn sky(&self, from: SingleFrom) -> Option<f32> {
+    pub(super) fn sky_from(&self, from: SingleFrom) -> Option<f32> {
         let is_held = match from {
             SingleFrom::Auto => self.sky_matters,
             SingleFrom::Direct => false,
@@ -70,10 +72,10 @@ impl Plan {
 }
 
 impl Pilot {
-    /// Takes samples with what is `known` so far by cameras of one scene; blocks not begun before the `deadline` stay black.
+    /// Takes samples with what is `known` so far by the cameras of `views`; blocks not begun before the `deadline` stay black.
     pub(super) fn new<'s>(
-        camera: impl Fn() -> Camera<'s> + Sync,
-        frame: [u32; 2],
+        camera: impl Fn(View) -> Camera<'s> + Sync,
+        views: &[View],
         known: &Known<'_>,
         seed: u64,
         deadline: Option<Instant>,
@@ -84,8 +86,9 @@ impl Pilot {
                 if has_passed(deadline) {
                     return (Block::default(), 0);
                 }
-                let camera = camera();
-                let mean = mean_of_block(&camera, frame, known, seed, block);
+                let view = view(views, block as usize);
+                let camera = camera(view);
+                let mean = mean_of_block(&camera, view.frame(), known, seed, block);
                 (mean, camera.tally().rays)
             })
             .collect();
@@ -137,6 +140,11 @@ impl Pilot {
             surface: allowed(Plan::SURFACE, share(|b| b.pixel.surface)),
         }
     }
+}
+
+/// The view in which a block is looked at: each has its turn.
+pub(super) fn view(views: &[View], block: usize) -> View {
+    views[block % views.len()]
 }
 
 fn beauty(p: &Pixel) -> Vec3 {
@@ -217,16 +225,16 @@ mod tests {
         let plan = pilot(0.1).plan(0.02);
         // Half the image is 0.71 of its root mean square, and 0.1 of the other half 0.07.
         assert!((plan.multiple / (0.5 * 0.02 / 0.5_f32.sqrt()) - 1.0).abs() < 1e-5);
-        assert_eq!(plan.sky(SingleFrom::Auto), Some(0.06));
+        assert_eq!(plan.sky_from(SingleFrom::Auto), Some(0.06));
         assert!((plan.surface / 0.012 - 1.0).abs() < 1e-5, "{plan:?}");
     }
 
     #[test]
     fn light_from_skies_that_does_not_show_is_sampled() {
         let plan = pilot(1e-3).plan(0.02);
-        assert_eq!(plan.sky(SingleFrom::Auto), None);
-        assert!(plan.sky(SingleFrom::Cache).is_some());
-        assert_eq!(pilot(0.1).plan(0.02).sky(SingleFrom::Direct), None);
+        assert_eq!(plan.sky_from(SingleFrom::Auto), None);
+        assert!(plan.sky_from(SingleFrom::Cache).is_some());
+        assert_eq!(pilot(0.1).plan(0.02).sky_from(SingleFrom::Direct), None);
     }
 
     #[test]
@@ -235,7 +243,7 @@ mod tests {
         black.blocks.fill(Block::default());
         let plan = black.plan(0.02);
         assert!(plan.multiple.is_finite() && plan.surface.is_finite());
-        assert_eq!(plan.sky(SingleFrom::Auto), None);
+        assert_eq!(plan.sky_from(SingleFrom::Auto), None);
         assert_eq!(black.weight(0), DVec3::ZERO);
     }
 }

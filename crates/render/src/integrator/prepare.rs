@@ -4,22 +4,27 @@
 
 use super::camera::{Camera, Known, Multiple};
 use super::field::FilledField;
-use super::fill::Filled;
 use super::fill::media::{Holds, Media};
 use super::fill::surfaces::{Side, Surfaces};
+use super::fill::{Fill, Filled, Kind, Light};
 use super::held_out::{HeldOut, Read};
 use super::pilot::{Pilot, Plan};
 use super::record_map::RecordMap;
-use super::{FILL_DEADLINE, Run, Way, has_passed};
-use crate::image::Image;
-use crate::options::{Crop, MultipleFrom};
+use super::view::View;
+use super::{FIELD_DEADLINE, FILL_DEADLINE, Run, Way, field, has_passed, is_lit};
+use crate::options::MultipleFrom;
 use crate::stats::Stats;
+use serde::{Deserialize, Serialize};
 use tyndall_transport::path::Reach;
 use tyndall_transport::walls::Walls;
 
 /// What was computed, where it is of use.
-#[derive(Default)]
+#[derive(Clone, Default, Deserialize, Serialize)]
 pub(super) struct Prepared {
+    /// The views it was computed for.
+    pub(super) views: Vec<View>,
+    /// How far off its parts may be; `None` where nothing was planned.
+    plan: Option<Plan>,
     pub(super) field: Option<FilledField>,
     /// Whether camera rays read multiple scattering from the field itself.
     pub(super) reads_field: bool,
@@ -30,11 +35,13 @@ pub(super) struct Prepared {
     pub(super) single: Option<Filled<Walls>>,
     pub(super) surface: Option<Filled<Side>>,
     /// What each part of it adds to the relative error of the image, by layer, where that is known.
-    pub(super) shares: Vec<(&'static str, Option<f64>)>,
+    pub(super) shares: Vec<(Light, Option<f64>)>,
     /// Whether the deadline came before all of it was done and measured.
-    pub(super) deadline_passed: bool,
+    #[serde(skip)]
+    deadline_passed: bool,
     /// Rays of the pilot and of the evaluations.
-    pub(super) rays: u64,
+    #[serde(skip)]
+    rays: u64,
 }
 
 impl Prepared {
@@ -74,7 +81,7 @@ impl Prepared {
     /// What each part adds to the relative error of the image, as far as it is known.
     pub(super) fn known_shares(&self) -> impl Iterator<Item = (&'static str, f64)> {
         let shares = self.shares.iter();
-        shares.filter_map(|&(layer, share)| Some((layer, share?)))
+        shares.filter_map(|&(light, share)| Some((light.layer(), share?)))
     }
 
     /// The relative error that all of it makes together; `None` where there is something whose error is not known.
@@ -84,14 +91,32 @@ impl Prepared {
         sum.map(f64::sqrt)
     }
 
-    /// Shows the records in the layers of `image`, the part `crop` of the frame, that are for that.
-    pub(super) fn show_records(&self, crop: Crop, image: &mut Image) {
-        let mut map = RecordMap::new(crop);
+    /// Whether it was computed for this view.
+    pub(super) fn is_for(&self, view: &View) -> bool {
+        self.views.contains(view)
+    }
+
+    /// Adds all records to a map of them.
+    pub(super) fn show_records(&self, map: &mut RecordMap<'_>) {
         for filled in [&self.multiple, &self.sky, &self.single] {
-            map.add(filled.as_ref());
+            map.add(filled.as_ref().map(|filled| &filled.cache));
         }
-        map.add(self.surface.as_ref());
-        map.show(image);
+        map.add(self.surface.as_ref().map(|filled| &filled.cache));
+    }
+
+    /// Counts no ray twice: what the next image tells as its cost is what comes from now on.
+    pub(super) fn forget_costs(&mut self) {
+        self.rays = 0;
+        if let Some(field) = &mut self.field {
+            field.rays = 0;
+        }
+        let media = [&mut self.multiple, &mut self.sky, &mut self.single];
+        for filled in media.into_iter().flatten() {
+            filled.rays = 0;
+        }
+        if let Some(filled) = &mut self.surface {
+            filled.rays = 0;
+        }
     }
 
     /// Tells `stats` what it cost.
@@ -115,23 +140,37 @@ impl Prepared {
 }
 
 impl Run<'_> {
-    /// Computes what samples on this `way` will read.
-    pub(super) fn prepare(&self, way: Way) -> Prepared {
-        if self.is_jarosz08() {
-            return self.jarosz08(way);
+    /// Computes what samples from new `views` will read, beside what was computed for others.
+    pub(super) fn prepare_for(&self, views: &[View], known: Prepared) -> Prepared {
+        let mut prepared = if self.is_jarosz08() {
+            self.jarosz08(views, known)
+        } else if known.views.is_empty() {
+            self.prepare(views)
+        } else {
+            self.extend(views, known)
+        };
+        // What the time limit ended is to be gone on with.
+        if !prepared.is_cut_short() {
+            prepared.views.extend(views);
         }
-        let holds_surfaces = self.has_surface_records(way);
+        prepared
+    }
+
+    /// Computes field and records.
+    fn prepare(&self, views: &[View]) -> Prepared {
+        let way = self.way;
+        let holds_surfaces = self.has_surface_records();
         if way != Way::Records && !holds_surfaces {
             return Prepared::default();
         }
         let mut prepared = Prepared::default();
-        let field = self.has_field(way).then(|| self.field());
+        let field = self.has_field().then(|| self.field(views));
         let reach = self.reach(field.as_ref());
-        let pilot = self.pilot(way, reach);
+        let pilot = self.pilot(views, reach);
         let plan = pilot.plan(self.error);
         let held_out = HeldOut {
             scene: self.scene,
-            frame: self.frame,
+            views,
             seed: self.options.seed,
             reach,
             pilot: &pilot,
@@ -144,7 +183,7 @@ impl Run<'_> {
             error
         };
         if way == Way::Records {
-            let kind = self.media(Holds::Multiple(reach), plan.multiple);
+            let kind = self.media(views, Holds::Multiple(reach), plan.multiple);
             let in_field = reach
                 .field
                 .filter(|_| self.options.multiple != MultipleFrom::Records);
@@ -156,52 +195,141 @@ impl Run<'_> {
                 field_error
             } else {
                 let n_rays = kind.n_rays();
-                let filled = self.fill(kind);
+                let filled = self.fill(views, kind, None);
                 let error = check(Read::Multiple(&filled.cache), n_rays);
                 prepared.multiple = Some(filled);
                 error
             };
-            prepared.shares.push(("multiple", error));
+            prepared.shares.push((Light::Multiple, error));
         }
-        if let Some(error) = plan.sky(self.options.single)
-            && self.may_hold_sky(way)
+        if let Some(error) = plan.sky_from(self.options.single)
+            && self.may_hold_sky()
         {
-            let kind = self.media(Holds::Sky, error);
+            let kind = self.media(views, Holds::Sky, error);
             let n_rays = kind.n_rays();
-            let filled = self.fill(kind);
+            let filled = self.fill(views, kind, None);
             let error = check(Read::Sky(&filled.cache), n_rays);
-            prepared.shares.push(("single", error));
+            prepared.shares.push((Light::Single, error));
             prepared.sky = Some(filled);
         }
         if holds_surfaces {
-            let kind = Surfaces {
-                scene: self.scene,
-                frame: self.frame,
-                reach,
-                seed: self.options.seed,
-                sky: prepared.sky.is_some(),
-                error: plan.surface,
-            };
+            let kind = self.surfaces(reach, prepared.sky.is_some(), plan.surface);
             let (n_rays, sky) = (kind.n_rays(), kind.sky);
-            let filled = self.fill(kind);
+            let filled = self.fill(views, kind, None);
             let error = check(Read::Surface(&filled.cache, sky), n_rays);
-            prepared.shares.push(("surface", error));
+            prepared.shares.push((Light::Surface, error));
             prepared.surface = Some(filled);
         }
         prepared.deadline_passed = has_passed(self.deadline(FILL_DEADLINE));
         prepared.rays = rays;
         prepared.field = field;
+        prepared.plan = Some(plan);
         prepared
     }
 
-    fn media<'s>(&'s self, holds: Holds<'s>, error: f32) -> Media<'s> {
-        Media::new(self.scene, self.frame, holds, self.options.seed, error)
+    /// Adds the records that `views` miss, by the plan that the others were made by.
+    fn extend(&self, views: &[View], mut prepared: Prepared) -> Prepared {
+        let Some(plan) = prepared.plan else {
+            return prepared;
+        };
+        let field = prepared.field.as_ref().map(|filled| &filled.field);
+        let reach = Reach {
+            max_depth: self.max_depth,
+            field,
+        };
+        if let Some(filled) = prepared.multiple.take() {
+            let kind = self.media(views, Holds::Multiple(reach), plan.multiple);
+            prepared.multiple = Some(self.fill(views, kind, Some(filled)));
+        }
+        if let Some(filled) = prepared.sky.take() {
+            let kind = self.media(views, Holds::Sky, plan.sky);
+            prepared.sky = Some(self.fill(views, kind, Some(filled)));
+        }
+        if let Some(filled) = prepared.surface.take() {
+            let kind = self.surfaces(reach, prepared.sky.is_some(), plan.surface);
+            prepared.surface = Some(self.fill(views, kind, Some(filled)));
+        }
+        prepared.deadline_passed = has_passed(self.deadline(FILL_DEADLINE));
+        prepared
+    }
+
+    /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
+    fn has_field(&self) -> bool {
+        self.way != Way::PathIntegrator
+            && is_lit(self.scene)
+            && self.max_depth.is_none()
+            && self.scene.media.is_isotropic()
+            && (self.way == Way::Records || !self.scene.geometry.is_empty())
+    }
+
+    /// Whether indirect light on surfaces is read from records: where paths of these can end in a field.
+    fn has_surface_records(&self) -> bool {
+        self.has_field() && !self.scene.geometry.is_empty()
+    }
+
+    /// Whether light straight from skies may be read from records: where surfaces hide most of them, few samples find it.
+    fn may_hold_sky(&self) -> bool {
+        self.way == Way::Records
+            && self.max_depth.is_none()
+            && self.scene.lights.has_even_skies()
+            && !self.scene.geometry.is_empty()
+    }
+
+    /// How far paths go that may end in a field.
+    fn reach<'f>(&self, field: Option<&'f FilledField>) -> Reach<'f> {
+        Reach {
+            max_depth: self.max_depth,
+            field: field.map(|filled| &filled.field),
+        }
+    }
+
+    fn field(&self, views: &[View]) -> FilledField {
+        field::fill(
+            self.scene,
+            views,
+            self.options.seed,
+            self.error,
+            self.deadline(FIELD_DEADLINE),
+            self.progress,
+        )
+    }
+
+    /// Fills a cache for the whole frames of `views`, whatever the crop, so that a crop shows the pixels of the full image; some of it may
+    /// be `known`.
+    pub(super) fn fill<K: Kind>(
+        &self,
+        views: &[View],
+        kind: K,
+        known: Option<Filled<K::Tag>>,
+    ) -> Filled<K::Tag> {
+        let fill = Fill {
+            kind,
+            scene: self.scene,
+            views,
+            seed: self.options.seed,
+            deadline: self.deadline(FILL_DEADLINE),
+        };
+        fill.run(known.unwrap_or_else(Filled::empty), self.progress)
+    }
+
+    fn media<'r>(&'r self, views: &[View], holds: Holds<'r>, error: f32) -> Media<'r> {
+        Media::new(self.scene, views, holds, self.options.seed, error)
+    }
+
+    fn surfaces<'r>(&'r self, reach: Reach<'r>, sky: bool, error: f32) -> Surfaces<'r> {
+        Surfaces {
+            scene: self.scene,
+            reach,
+            seed: self.options.seed,
+            sky,
+            error,
+        }
     }
 
     /// Camera samples that read what light there is from the field, or trace it.
-    fn pilot(&self, way: Way, reach: Reach<'_>) -> Pilot {
+    fn pilot(&self, views: &[View], reach: Reach<'_>) -> Pilot {
         let known = Known {
-            multiple: match (way, reach.field) {
+            multiple: match (self.way, reach.field) {
                 (Way::Records, Some(field)) => Multiple::Field(field),
                 (Way::Records | Way::Paths, _) => Multiple::Paths,
                 _ => Multiple::None,
@@ -210,8 +338,8 @@ impl Run<'_> {
             single: None,
             indirect: None,
         };
-        let camera = || Camera::new(self.scene, self.frame, reach);
+        let camera = |view| Camera::new(self.scene, view, reach);
         let deadline = self.deadline(FILL_DEADLINE);
-        Pilot::new(camera, self.frame, &known, self.options.seed, deadline)
+        Pilot::new(camera, views, &known, self.options.seed, deadline)
     }
 }

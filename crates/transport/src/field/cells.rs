@@ -4,6 +4,7 @@
 //! face.
 
 use glam::{DVec3, IVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -14,19 +15,19 @@ pub(super) const MOST_SIDES: usize = 4;
 /// By how many sizes cells in media are larger than those on surfaces: light changes slowly there.
 const MEDIUM_LARGER: i32 = 1;
 
-/// Widths of cells: a share of the distance to the eye, rounded down to a power of two.
-#[derive(Clone, Copy, Debug)]
+/// Widths of cells: a share of the distance to the nearest eye, rounded down to a power of two.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CellWidths {
-    eye: Vec3,
+    eyes: Vec<Vec3>,
     per_metre: f32,
     least: f32,
 }
 
 impl CellWidths {
-    /// Widths of `share` of the distance to `eye`, and of `least` metres at least.
-    pub fn around(eye: Vec3, share: f32, least: f32) -> Self {
+    /// Widths of `share` of the distance to the nearest of `eyes`, and of `least` metres at least.
+    pub fn around(eyes: &[Vec3], share: f32, least: f32) -> Self {
         Self {
-            eye,
+            eyes: eyes.into(),
             per_metre: share,
             least,
         }
@@ -34,12 +35,13 @@ impl CellWidths {
 
     /// Cells of one width everywhere, in metres.
     pub fn even(width: f32) -> Self {
-        Self::around(Vec3::ZERO, 0.0, width)
+        Self::around(&[], 0.0, width)
     }
 
     /// Width of the smallest cells at `p`, as an exponent of two.
     pub(super) fn exponent(&self, p: Vec3, kind: Kind) -> i32 {
-        let width = (self.per_metre * p.distance(self.eye)).max(self.least);
+        let distances = self.eyes.iter().map(|eye| p.distance(*eye));
+        let width = (self.per_metre * distances.fold(f32::MAX, f32::min)).max(self.least);
         let larger = match kind {
             Kind::Medium => MEDIUM_LARGER,
             Kind::Surface(_) => 0,
@@ -48,13 +50,16 @@ impl CellWidths {
     }
 }
 
+/// Exponents of widths that are normal numbers.
+const EXPONENTS: std::ops::Range<i32> = -126..128;
+
 /// Width of cells, in metres.
 pub(super) fn width(exponent: i32) -> f32 {
     f32::from_bits(((127 + exponent) as u32) << 23)
 }
 
 /// What a cell is a cell of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Kind {
     Medium,
     /// The side surfaces face: twice the axis nearest to the normal, plus one where the normal points down it.
@@ -69,7 +74,7 @@ impl Kind {
 }
 
 /// Which cell: its size, its place in the lattice of that size, and what it is a cell of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Place {
     pub(super) exponent: i32,
     pub(super) lattice: IVec3,
@@ -133,7 +138,7 @@ impl Light {
 }
 
 /// Light found in a cell, all and indirect.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Sum {
     pub(super) n: u32,
     /// f64 because millions of terms may be added.
@@ -171,7 +176,7 @@ impl Sum {
 pub(super) const NO_LINK: u32 = u32::MAX;
 
 /// One side of a cell: the part of it that is seen from one place.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Side {
     pub(super) place: Place,
     /// Where light was first found on it, a little off a surface.
@@ -192,6 +197,27 @@ pub(super) struct Cells {
 }
 
 impl Cells {
+    /// The cells that these sides make up; `None` where their numbers do not fit together.
+    pub(super) fn from_sides(sides: Vec<Side>) -> Option<Self> {
+        let mut is_first = vec![true; sides.len()];
+        for (i, side) in sides.iter().enumerate() {
+            if !EXPONENTS.contains(&side.place.exponent) {
+                return None;
+            }
+            if let Some(next) = side.next {
+                // Later sides stand behind earlier ones, so that there is an end to them.
+                let is_later = next as usize > i;
+                *is_first.get_mut(next as usize).filter(|_| is_later)? = false;
+            }
+        }
+        let numbered = (0..).zip(&sides).zip(is_first);
+        let first_sides = numbered
+            .filter(|(_, is_first)| *is_first)
+            .map(|((i, side), _)| (side.place.key(), i))
+            .collect();
+        Some(Self { sides, first_sides })
+    }
+
     /// The first side of the cell at `place`.
     pub(super) fn find(&self, place: Place) -> Option<u32> {
         self.first_sides.get(&place.key()).copied()
@@ -215,6 +241,11 @@ impl Cells {
             sum: Sum::default(),
             next: None,
         });
+    }
+
+    /// The mean light of each side.
+    pub(super) fn means(&self) -> Vec<Light> {
+        self.sides.iter().map(|side| side.sum.mean()).collect()
     }
 
     /// The sides of a cell, from its first.

@@ -5,13 +5,16 @@
 
 mod cells;
 mod end;
+mod stored;
 mod walk;
 
 use crate::world::{Geometry, Lights, SurfaceHit, World};
 use cells::{Cells, Kind, Light, MOST_SIDES, NO_LINK, Place, SIZES, Side, width};
 use glam::{IVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
+use stored::Stored;
 use tyndall_math::{Ray, Sampler};
 
 pub use cells::CellWidths;
@@ -126,9 +129,7 @@ impl Filling {
         }
         Field {
             surroundings: vec![Surroundings::UNKNOWN; self.cells.sides.len()],
-            light: (self.cells.sides.iter())
-                .map(|side| side.sum.mean())
-                .collect(),
+            light: self.cells.means(),
             widths: self.widths,
             cells: self.cells,
         }
@@ -211,7 +212,8 @@ pub struct FieldLight {
 }
 
 /// Light in cells, ready to be read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize)]
+#[serde(try_from = "Stored<'_>")]
 pub struct Field {
     widths: CellWidths,
     cells: Cells,
@@ -220,7 +222,7 @@ pub struct Field {
 }
 
 /// What surrounds the place from which a cell was seen first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Surroundings {
     /// The cells around that light in a medium is interpolated with: those that are seen from here.
     links: [u32; NEIGHBOURS.len()],

@@ -6,7 +6,7 @@
 //! are blended as `tyndall-cache` does it.
 
 use super::surfaces::{Side, SurfaceCache, Surfaces};
-use super::{Candidate, Counted, Kind, Light, media, record, surfaces};
+use super::{Candidate, Counted, Kind, Light, View, media, record, surfaces};
 use glam::Vec3;
 use tyndall_cache::Record;
 use tyndall_math::Ray;
@@ -77,7 +77,8 @@ fn most_radius(candidate: &Candidate, height: u32) -> f32 {
 /// Light scattered in media along the camera's rays.
 pub(in crate::integrator) struct Volume<'s> {
     scene: &'s Scene,
-    frame: [u32; 2],
+    /// Of the frame, in pixels.
+    height: u32,
     seed: u64,
     tolerance: f32,
     samples: Samples,
@@ -95,13 +96,13 @@ impl<'s> Volume<'s> {
     /// Single scattering of all lights, at a target `error` of the image.
     pub(in crate::integrator) fn single(
         scene: &'s Scene,
-        frame: [u32; 2],
+        height: u32,
         seed: u64,
         error: f32,
     ) -> Self {
         Self {
             scene,
-            frame,
+            height,
             seed,
             tolerance: SINGLE_TOLERANCE * error.sqrt(),
             samples: Samples::Lights(samples(LIGHT_SAMPLES_GAIN, error)),
@@ -111,7 +112,7 @@ impl<'s> Volume<'s> {
     /// Multiple scattering of up to `max_depth` events, at a target `error` of the image.
     pub(in crate::integrator) fn multiple(
         scene: &'s Scene,
-        frame: [u32; 2],
+        height: u32,
         max_depth: Option<u32>,
         seed: u64,
         error: f32,
@@ -119,7 +120,7 @@ impl<'s> Volume<'s> {
         let pattern = Box::new(GatherPattern::new(samples(PATHS_GAIN, error)));
         Self {
             scene,
-            frame,
+            height,
             seed,
             tolerance: MULTIPLE_TOLERANCE * error.sqrt(),
             samples: Samples::Paths(pattern, max_depth),
@@ -133,11 +134,11 @@ impl Kind for Volume<'_> {
     const RADIUS_SLOPE: f32 = f32::INFINITY;
 
     fn most_radius(&self, candidate: &Candidate) -> f32 {
-        most_radius(candidate, self.frame[1])
+        most_radius(candidate, self.height)
     }
 
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, visit: impl FnMut(Candidate)) {
-        media::points_on(self.scene, self.frame, (ray, pixel), offset, visit);
+    fn points_on(&self, view: &View, ray: &Ray, offset: f32, visit: impl FnMut(Candidate)) {
+        media::points_on(self.scene, (view, ray), offset, visit);
     }
 
     fn covers(&self, cache: &media::MediaCache, candidate: &Candidate) -> bool {
@@ -168,7 +169,7 @@ impl Kind for Volume<'_> {
                 ((g.value, g.value_error), g.gradient, g.gradient_norm)
             }
         };
-        let limits = (self.frame[1], self.tolerance);
+        let limits = (self.height, self.tolerance);
         let record = record_as_published(candidate, limits, value, gradient, norm)?;
         Some((record, Walls::NONE))
     }
@@ -177,7 +178,8 @@ impl Kind for Volume<'_> {
 /// Indirect light on the surfaces that the camera sees.
 pub(in crate::integrator) struct Irradiance<'s> {
     pub(in crate::integrator) scene: &'s Scene,
-    pub(in crate::integrator) frame: [u32; 2],
+    /// Of the frame, in pixels.
+    pub(in crate::integrator) height: u32,
     pub(in crate::integrator) max_depth: Option<u32>,
     pub(in crate::integrator) seed: u64,
     /// Target error of the image.
@@ -190,11 +192,11 @@ impl Kind for Irradiance<'_> {
     const RADIUS_SLOPE: f32 = f32::INFINITY;
 
     fn most_radius(&self, candidate: &Candidate) -> f32 {
-        most_radius(candidate, self.frame[1])
+        most_radius(candidate, self.height)
     }
 
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], _: f32, visit: impl FnMut(Candidate)) {
-        surfaces::point_on(self.scene, self.frame, (ray, pixel)).map(visit);
+    fn points_on(&self, view: &View, ray: &Ray, _: f32, visit: impl FnMut(Candidate)) {
+        surfaces::point_on(self.scene, view, ray).map(visit);
     }
 
     fn covers(&self, cache: &SurfaceCache, candidate: &Candidate) -> bool {
@@ -214,7 +216,7 @@ impl Kind for Irradiance<'_> {
         let n_rays = samples(SURFACE_PATHS_GAIN, self.error);
         let reach = Reach::depth(self.max_depth);
         let g = irradiance(&world, &hit, n_rays, false, reach, key);
-        let limits = (self.frame[1], SURFACE_TOLERANCE * self.error.sqrt());
+        let limits = (self.height, SURFACE_TOLERANCE * self.error.sqrt());
         let value = (g.value, g.value_error);
         let record = record_as_published(candidate, limits, value, g.gradient, g.gradient_norm)?;
         Some((record, Side::open(candidate.normal)))

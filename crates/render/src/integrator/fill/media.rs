@@ -3,9 +3,10 @@
 //! Their radii follow the lengths over which the field changes; none reaches past the walls around it.
 
 use super::{
-    ATTEMPTS, Candidate, Counted, Kind, Light, MORE_RAYS, first_rays, quiet_enough, record,
+    ATTEMPTS, Candidate, Counted, Kind, Light, MORE_RAYS, View, first_rays, quiet_enough, record,
     relative_slope,
 };
+use crate::integrator::view::spread;
 use glam::Vec3;
 use tyndall_cache::{Cache, Record};
 use tyndall_math::{Key, Ray, Sampler, warp};
@@ -36,6 +37,9 @@ const CLEARANCE: f32 = 0.04;
 /// Rays that look for the nearest surface.
 const CLEARANCE_RAYS: u64 = 32;
 
+/// Views that tell how far cameras see, at most.
+const VIEWS: usize = 16;
+
 /// A cache of light in media; records are tagged with the walls they do not reach past.
 pub(in crate::integrator) type MediaCache = Cache<3, Walls>;
 
@@ -51,7 +55,6 @@ pub(in crate::integrator) enum Holds<'s> {
 /// Light scattered along the camera's rays.
 pub(in crate::integrator) struct Media<'s> {
     scene: &'s Scene,
-    frame: [u32; 2],
     holds: Holds<'s>,
     seed: u64,
     error: f32,
@@ -70,7 +73,7 @@ impl<'s> Media<'s> {
     /// For a target `error` of what the records hold.
     pub(in crate::integrator) fn new(
         scene: &'s Scene,
-        frame: [u32; 2],
+        views: &[View],
         holds: Holds<'s>,
         seed: u64,
         error: f32,
@@ -82,14 +85,13 @@ impl<'s> Media<'s> {
         let n_rays = first_rays(gain, error);
         Self {
             scene,
-            frame,
             holds,
             seed,
             error,
             patterns: std::array::from_fn(|attempt| {
                 GatherPattern::new(n_rays * MORE_RAYS.pow(attempt as u32))
             }),
-            view: view_length(scene, frame),
+            view: view_length(scene, views),
         }
     }
 }
@@ -117,11 +119,10 @@ pub(in crate::integrator) fn nearest(cache: &MediaCache, p: Vec3, reach: f32) ->
     nearest.map(|(_, index)| cache.records()[index].value.into())
 }
 
-/// Visits the points in media on the camera ray through a pixel, where records are wanted; `offset` from 0 to 1 moves them.
+/// Visits the points in media on a camera ray, where records are wanted; `offset` from 0 to 1 moves them.
 pub(super) fn points_on(
     scene: &Scene,
-    frame: [u32; 2],
-    (ray, pixel): (&Ray, [u32; 2]),
+    (view, ray): (&View, &Ray),
     offset: f32,
     mut visit: impl FnMut(Candidate),
 ) {
@@ -134,9 +135,8 @@ pub(super) fn points_on(
             visit(Candidate {
                 position: ray.at(t),
                 normal: Vec3::ZERO,
-                footprint: scene.camera.footprint(t, frame[1]),
+                footprint: view.footprint(t),
                 ray: *ray,
-                pixel,
             });
         }
     }
@@ -155,8 +155,8 @@ impl Kind for Media<'_> {
         RADIUS_RANGE[1] * self.view
     }
 
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, visit: impl FnMut(Candidate)) {
-        points_on(self.scene, self.frame, (ray, pixel), offset, visit);
+    fn points_on(&self, view: &View, ray: &Ray, offset: f32, visit: impl FnMut(Candidate)) {
+        points_on(self.scene, (view, ray), offset, visit);
     }
 
     fn covers(&self, cache: &MediaCache, candidate: &Candidate) -> bool {
@@ -216,20 +216,18 @@ impl Kind for Media<'_> {
 }
 
 /// Mean length over which camera rays see into the media, in metres.
-fn view_length(scene: &Scene, [w, h]: [u32; 2]) -> f32 {
+fn view_length(scene: &Scene, views: &[View]) -> f32 {
     let world = scene.world();
     let (mut sum, mut n) = (0.0, 0.0);
-    for j in 0..8 {
-        for i in 0..8 {
-            let (x, y) = ((i as f32 + 0.5) / 8.0, (j as f32 + 0.5) / 8.0);
-            let ray = scene.camera.ray(x * w as f32, y * h as f32, w, h);
-            let (_, flight) = FreeFlight::to_surface(&world, &ray);
-            if flight.can_stop() {
-                let start = flight.segment().range().0;
-                if let Some(t) = flight.sample_inside(0.9) {
-                    sum += t - start;
-                    n += 1.0;
-                }
+    let places = (0..64).map(|i| [i % 8, i / 8].map(|n| (n as f32 + 0.5) / 8.0));
+    for (place, view) in places.flat_map(|place| spread(views, VIEWS).map(move |v| (place, v))) {
+        let ray = view.ray_at(place);
+        let (_, flight) = FreeFlight::to_surface(&world, &ray);
+        if flight.can_stop() {
+            let start = flight.segment().range().0;
+            if let Some(t) = flight.sample_inside(0.9) {
+                sum += t - start;
+                n += 1.0;
             }
         }
     }

@@ -5,16 +5,20 @@
 
 pub(super) mod jarosz08;
 pub(super) mod media;
+mod stored;
 pub(super) mod surfaces;
 
 use super::counted::Counted;
 use super::has_passed;
+use super::view::View;
 use crate::options::{Phase, Progress};
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
+use stored::Stored;
 use tyndall_cache::{Cache, Record};
 use tyndall_math::{Key, Purpose, Ray, Sampler};
 use tyndall_scene::Scene;
@@ -41,14 +45,23 @@ const ATTEMPTS: usize = 2;
 const NOISE: f32 = 4.0;
 
 /// Which light records hold; their random numbers are kept apart by it.
-#[derive(Clone, Copy)]
-enum Light {
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub(super) enum Light {
     Multiple,
     Surface,
     Single,
 }
 
 impl Light {
+    /// The layer of the image that it is in.
+    pub(super) fn layer(self) -> &'static str {
+        match self {
+            Self::Multiple => "multiple",
+            Self::Surface => "surface",
+            Self::Single => "single",
+        }
+    }
+
     /// The random numbers of record number `index`.
     fn key(self, seed: u64, index: u64) -> Key {
         Key {
@@ -114,8 +127,8 @@ pub(super) trait Kind: Sync {
     /// Largest radius of a record at a point.
     fn most_radius(&self, candidate: &Candidate) -> f32;
 
-    /// The points on a camera ray that ask for records.
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], offset: f32, visit: impl FnMut(Candidate));
+    /// The points on a camera ray of `view` that ask for records.
+    fn points_on(&self, view: &View, ray: &Ray, offset: f32, visit: impl FnMut(Candidate));
 
     /// Whether records are valid at a point.
     fn covers(&self, cache: &Cache<3, Self::Tag>, candidate: &Candidate) -> bool;
@@ -135,22 +148,45 @@ pub(super) trait Kind: Sync {
 pub(super) struct Fill<'s, K> {
     pub(super) kind: K,
     pub(super) scene: &'s Scene,
-    pub(super) frame: [u32; 2],
+    /// From where records are wanted.
+    pub(super) views: &'s [View],
     pub(super) seed: u64,
     /// When to stop with what there is.
     pub(super) deadline: Option<Instant>,
 }
 
+/// Where a fill looks for points without records.
+struct Gaps {
+    /// Of the view.
+    number: usize,
+    /// How fine the lattice of camera rays is, and the pixels between these.
+    level: usize,
+    stride: u32,
+}
+
 /// A filled cache.
+#[derive(Clone, Deserialize)]
+#[serde(try_from = "Stored<'_, T>")]
+#[serde(bound(deserialize = "T: Clone + Deserialize<'de>"))]
 pub(super) struct Filled<T> {
     pub(super) cache: Cache<3, T>,
-    /// The pixel through which each record was asked for: column and row.
-    pub(super) pixels: Vec<[u32; 2]>,
     pub(super) rays: u64,
     /// Points at which records were computed, kept or not: each has random numbers of its own.
     asked: usize,
     /// Whether the deadline ended the fill.
     pub(super) cut_short: bool,
+}
+
+impl<T: Clone> Filled<T> {
+    /// Nothing yet.
+    pub(super) fn empty() -> Self {
+        Self {
+            cache: Cache::tagged(),
+            rays: 0,
+            asked: 0,
+            cut_short: false,
+        }
+    }
 }
 
 /// A point on a camera ray that asks for a record.
@@ -163,8 +199,6 @@ pub(super) struct Candidate {
     footprint: f32,
     /// The camera ray.
     ray: Ray,
-    /// Column and row of the pixel it is seen in.
-    pixel: [u32; 2],
 }
 
 /// Surfaces share records where the cosine between their normals is at least this.
@@ -177,37 +211,63 @@ impl Candidate {
 }
 
 impl<K: Kind> Fill<'_, K> {
-    /// Computes the records the camera needs.
-    pub(super) fn run(&self, progress: &dyn Progress) -> Filled<K::Tag> {
-        let mut filled = Filled {
-            cache: Cache::tagged(),
-            pixels: Vec::new(),
-            rays: 0,
-            asked: 0,
-            cut_short: false,
-        };
-        let strides = strides(self.frame);
-        for (level, &stride) in strides.iter().enumerate() {
-            for round in 0..ROUNDS {
-                let fraction = (level as f32 + round as f32 / ROUNDS as f32) / strides.len() as f32;
-                progress.update(Phase::Fill, fraction, filled.cache.len());
-                let (missing, share) = self.uncovered(&filled.cache, level as u64, stride);
-                if self.out_of_time() {
-                    filled.cut_short = true;
+    /// Computes the records the cameras need beside those that there are.
+    pub(super) fn run(
+        &self,
+        mut filled: Filled<K::Tag>,
+        progress: &dyn Progress,
+    ) -> Filled<K::Tag> {
+        let mut order: Vec<usize> = (0..self.views.len()).collect();
+        // Views far apart first: what lies between them has its records then.
+        order.sort_by_key(|&number| (number as u32).reverse_bits());
+        let done = |step: usize, part: f32| (step as f32 + part) / order.len() as f32;
+        for (step, &number) in order.iter().enumerate() {
+            let strides = strides(self.views[number].frame());
+            for (level, &stride) in strides.iter().enumerate() {
+                let gaps = Gaps {
+                    number,
+                    level,
+                    stride,
+                };
+                let part = level as f32 / strides.len() as f32;
+                let is_covered = self.close(&mut filled, &gaps, progress, done(step, part));
+                if filled.cut_short {
                     return filled;
                 }
-                if missing.is_empty() || (round == 0 && share < GAPS_LEFT) {
-                    break;
-                }
-                let points = thin(&missing, &filled.cache, |point| {
-                    self.kind.most_radius(point)
-                });
-                if !self.compute(&mut filled, &points, round, progress, fraction) {
+                if is_covered && step > 0 {
                     break;
                 }
             }
         }
         filled
+    }
+
+    /// Computes records where those of one level are missing; tells whether there were enough at once.
+    fn close(
+        &self,
+        filled: &mut Filled<K::Tag>,
+        gaps: &Gaps,
+        progress: &dyn Progress,
+        fraction: f32,
+    ) -> bool {
+        for round in 0..ROUNDS {
+            progress.update(Phase::Fill, fraction, filled.cache.len());
+            let (missing, share) = self.uncovered(&filled.cache, gaps);
+            if self.out_of_time() {
+                filled.cut_short = true;
+                return false;
+            }
+            if missing.is_empty() || (round == 0 && share < GAPS_LEFT) {
+                return round == 0;
+            }
+            let points = thin(&missing, &filled.cache, |point| {
+                self.kind.most_radius(point)
+            });
+            if !self.compute(filled, &points, round, progress, fraction) {
+                return false;
+            }
+        }
+        false
     }
 
     /// Computes records at `points` and inserts them in order; false where the cache refused them.
@@ -239,20 +299,13 @@ impl<K: Kind> Fill<'_, K> {
             })
             .collect();
         filled.rays += computed.iter().map(|(_, n)| n).sum::<u64>();
-        let (records, seen): (Vec<_>, Vec<_>) = computed
-            .into_iter()
-            .zip(points)
-            .filter_map(|((record, _), point)| Some((record?, point.pixel)))
-            .unzip();
+        let records = computed.into_iter().filter_map(|(record, _)| record);
         let cache = &mut filled.cache;
-        let mut kept = cache.insert_tagged(records);
+        let mut kept = cache.insert_tagged(records.collect());
         if K::RADIUS_SLOPE.is_finite() {
             kept = kept.and_then(|()| cache.clamp_radii(K::RADIUS_SLOPE));
         }
         debug_assert!(kept.is_ok(), "{kept:?}");
-        if kept.is_ok() {
-            filled.pixels.extend(seen);
-        }
         kept.is_ok()
     }
 
@@ -260,21 +313,27 @@ impl<K: Kind> Fill<'_, K> {
         has_passed(self.deadline)
     }
 
-    /// Points on the camera rays of one level that no record covers, in a fixed order, and their share of all points.
+    /// Points on the camera rays of one level in view `number` that no record covers, in a fixed order, and their share of all points.
     fn uncovered(
         &self,
         cache: &Cache<3, K::Tag>,
-        level: u64,
-        stride: u32,
+        &Gaps {
+            number,
+            level,
+            stride,
+        }: &Gaps,
     ) -> (Vec<Candidate>, f32) {
-        let [w, h] = self.frame;
+        let view = &self.views[number];
+        let [w, h] = view.frame();
         let rows: Vec<u32> = (0..h).step_by(stride as usize).collect();
         let found: Vec<(Vec<Candidate>, usize)> = rows
             .par_iter()
             .map(|&y| {
                 let (mut row, mut points) = (Vec::new(), 0);
                 for x in (0..w).step_by(stride as usize) {
-                    let index = (level << 40) | (u64::from(y) * u64::from(w) + u64::from(x));
+                    let index = (number as u64) << 48
+                        | (level as u64) << 40
+                        | (u64::from(y) * u64::from(w) + u64::from(x));
                     let key = Key {
                         seed: self.seed,
                         purpose: Purpose::Placement,
@@ -282,14 +341,12 @@ impl<K: Kind> Fill<'_, K> {
                     };
                     let mut sampler = Sampler::new(key, 0);
                     let [u, v] = sampler.next_2d();
-                    let ray = self.scene.camera.ray(
+                    let ray = view.ray(
                         (x as f32 + u * stride as f32).min(w as f32),
                         (y as f32 + v * stride as f32).min(h as f32),
-                        w,
-                        h,
                     );
                     let offset = sampler.next_1d();
-                    self.kind.points_on(&ray, [x, y], offset, |candidate| {
+                    self.kind.points_on(view, &ray, offset, |candidate| {
                         points += 1;
                         if !self.kind.covers(cache, &candidate) {
                             row.push(candidate);

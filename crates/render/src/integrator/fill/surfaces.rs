@@ -4,10 +4,11 @@
 //! surfaces (Ward et al. 1988).
 
 use super::{
-    Candidate, Counted, Kind, Light, MORE_RAYS, SAME_SURFACE, first_rays, quiet_enough, record,
-    relative_slope,
+    Candidate, Counted, Kind, Light, MORE_RAYS, SAME_SURFACE, View, first_rays, quiet_enough,
+    record, relative_slope,
 };
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use tyndall_cache::{Cache, Record};
 use tyndall_math::Ray;
@@ -27,7 +28,7 @@ const FOOTPRINTS: [f32; 2] = [1.5, 24.0];
 const THICKNESS: f32 = 0.2;
 
 /// Where a record on a surface is valid.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(in crate::integrator) struct Side {
     normal: Vec3,
     walls: Walls,
@@ -74,7 +75,6 @@ impl Side {
 /// Light on the surfaces that the camera sees: indirect light, and that of skies.
 pub(in crate::integrator) struct Surfaces<'s> {
     pub(in crate::integrator) scene: &'s Scene,
-    pub(in crate::integrator) frame: [u32; 2],
     pub(in crate::integrator) reach: Reach<'s>,
     pub(in crate::integrator) seed: u64,
     /// Whether light straight from skies is held, too.
@@ -95,19 +95,14 @@ impl Surfaces<'_> {
     }
 }
 
-/// The point that the camera ray through a pixel meets, where a record is wanted.
-pub(super) fn point_on(
-    scene: &Scene,
-    frame: [u32; 2],
-    (ray, pixel): (&Ray, [u32; 2]),
-) -> Option<Candidate> {
+/// The point that a camera ray meets, where a record is wanted.
+pub(super) fn point_on(scene: &Scene, view: &View, ray: &Ray) -> Option<Candidate> {
     let hit = Surfaces::hit(&scene.geometry, ray)?;
     Some(Candidate {
         position: hit.position,
         normal: hit.bsdf.normal(),
-        footprint: scene.camera.footprint(hit.t, frame[1]),
+        footprint: view.footprint(hit.t),
         ray: *ray,
-        pixel,
     })
 }
 
@@ -124,8 +119,8 @@ impl Kind for Surfaces<'_> {
         FOOTPRINTS[1] * candidate.footprint
     }
 
-    fn points_on(&self, ray: &Ray, pixel: [u32; 2], _: f32, visit: impl FnMut(Candidate)) {
-        point_on(self.scene, self.frame, (ray, pixel)).map(visit);
+    fn points_on(&self, view: &View, ray: &Ray, _: f32, visit: impl FnMut(Candidate)) {
+        point_on(self.scene, view, ray).map(visit);
     }
 
     fn covers(&self, cache: &SurfaceCache, candidate: &Candidate) -> bool {

@@ -1,0 +1,257 @@
+//! Cache files and frames, tried on the `tyndall` program as a user runs it.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use tyndall_tests::image::Channels;
+use tyndall_tests::program::run_tyndall;
+
+/// A box of fog with a wall, lit by a lamp and a sky: records of multiple scattering, of the sky and on surfaces.
+const ROOM: &str = r#"Scene(
+    gltf: "room.gltf",
+    camera: LookAt(eye: (0.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), vfov: 45.0),
+    film: Film(width: 22, height: 18),
+    lights: [
+        Point(position: (0.5, 1.6, 0.5), intensity: (4.0, 3.0, 2.0)),
+        Sky(radiance: (0.2, 0.3, 0.4)),
+    ],
+    media: [Medium(
+        region: Box(min: (-1.5, 0.0, -1.5), max: (1.5, 2.0, 1.5)),
+        sigma_t: (0.5, 0.5, 0.5), albedo: (0.9, 0.9, 0.9),
+    )],
+    render: Render(error: 0.2),
+)"#;
+
+/// A floor of four metres and a wall on it.
+fn room() -> String {
+    let corners: [[f32; 3]; 8] = [
+        [-2.0, 0.0, -2.0],
+        [2.0, 0.0, -2.0],
+        [2.0, 0.0, 2.0],
+        [-2.0, 0.0, 2.0],
+        [-0.5, 0.0, -0.5],
+        [0.5, 0.0, -0.5],
+        [0.5, 1.2, -0.5],
+        [-0.5, 1.2, -0.5],
+    ];
+    let indices: [u16; 12] = [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7];
+    let mut bytes: Vec<u8> = corners
+        .iter()
+        .flatten()
+        .flat_map(|c| c.to_le_bytes())
+        .collect();
+    bytes.extend(indices.iter().flat_map(|i| i.to_le_bytes()));
+    let hex = bytes.iter().map(|byte| format!("%{byte:02x}"));
+    serde_json::json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 8, "min": [-2, 0, -2], "max": [2, 1.2, 2] },
+            { "bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": 12 },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": 96 },
+            { "buffer": 0, "byteOffset": 96, "byteLength": 24 },
+        ],
+        "buffers": [{
+            "byteLength": 120,
+            "uri": format!("data:application/octet-stream,{}", hex.collect::<String>()),
+        }],
+    })
+    .to_string()
+}
+
+/// A folder that holds the room.
+fn folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("room.ron"), ROOM).unwrap();
+    fs::write(folder.path().join("room.gltf"), room()).unwrap();
+    folder
+}
+
+/// Runs `tyndall` with arguments separated by spaces; returns exit status and standard error.
+fn run(folder: &TempDir, arguments: &str) -> (Option<i32>, String) {
+    let output = run_tyndall(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    (
+        output.status.code(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+fn succeed(folder: &TempDir, arguments: &str) {
+    let (status, stderr) = run(folder, arguments);
+    assert_eq!(status, Some(0), "tyndall {arguments}\n{stderr}");
+}
+
+fn pixels(folder: &TempDir, name: &str) -> Channels {
+    Channels::read(&folder.path().join(name)).unwrap()
+}
+
+#[test]
+fn kept_records_make_the_pixels_that_fresh_ones_make() {
+    let folder = folder();
+    for method in ["tyndall", "jarosz08"] {
+        let options = format!("--quiet --error 0.4 --method {method}");
+        succeed(
+            &folder,
+            &format!("render room.ron {options} -o fresh.exr --cache-out room.cache"),
+        );
+        succeed(
+            &folder,
+            &format!("render room.ron {options} -o kept.exr --cache-in room.cache"),
+        );
+        let [fresh, kept] = ["fresh.exr", "kept.exr"].map(|name| pixels(&folder, name));
+        assert!(fresh == kept, "{method}");
+    }
+}
+
+#[test]
+fn tiles_from_one_cache_file_make_up_the_whole_frame() {
+    let folder = folder();
+    succeed(
+        &folder,
+        "render room.ron --quiet --cache-out room.cache -o whole.exr",
+    );
+    let whole = pixels(&folder, "whole.exr");
+    // Borders within blocks of pixels, and beside them.
+    for (x, y, w, h) in [(0, 0, 9, 18), (9, 0, 13, 7), (9, 7, 13, 11), (21, 17, 1, 1)] {
+        let crop = format!("--crop {x},{y},{w},{h}");
+        succeed(
+            &folder,
+            &format!("render room.ron --quiet --cache-in room.cache {crop} -o tile.exr"),
+        );
+        let tile = pixels(&folder, "tile.exr");
+        for (name, values) in &tile.samples {
+            for (i, value) in values.iter().enumerate() {
+                let (column, row) = (x + i % w, y + i / w);
+                assert_eq!(
+                    *value,
+                    whole.samples[name][row * 22 + column],
+                    "{name} {column} {row}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_not_the_scenes_whole_cache_is_refused() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    succeed(
+        &folder,
+        "render room.ron --quiet --cache-out room.cache --fill-only",
+    );
+    let whole = fs::read(file("room.cache")).unwrap();
+    let refused = |scene: &str, bytes: &[u8], message: &str, options: &str| {
+        fs::write(file("other.cache"), bytes).unwrap();
+        let command = format!("render {scene} --quiet -o x.exr --cache-in other.cache{options}");
+        let (status, stderr) = run(&folder, &command);
+        assert_eq!(status, Some(2), "{message}: {stderr}");
+        assert!(stderr.contains(message), "{message}: {stderr}");
+        assert!(!file("x.exr").exists());
+    };
+    let flipped = |at: usize| {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x10;
+        bytes
+    };
+    for (at, message) in [
+        (0, "not a cache file"),
+        (8, "version"),
+        (12, "cut short"),
+        (19, "cut short"),
+        (20, "damaged"),
+        (whole.len() / 2, "damaged"),
+        (whole.len() - 1, "damaged"),
+    ] {
+        refused("room.ron", &flipped(at), message, "");
+    }
+    for n in [0, 5, 19, 20, whole.len() / 2, whole.len() - 1] {
+        let message = if n == 0 {
+            "not a cache file"
+        } else {
+            "cut short"
+        };
+        refused("room.ron", &whole[..n], message, "");
+    }
+    refused("room.ron", &[&whole[..], &[0]].concat(), "damaged", "");
+    refused("room.ron", &whole, "--max-depth none", " --max-depth 5");
+    refused("room.ron", &whole, "--method tyndall", " --method jarosz08");
+    fs::write(
+        file("dimmer.ron"),
+        ROOM.replace("4.0, 3.0, 2.0", "4.0, 3.0, 1.9"),
+    )
+    .unwrap();
+    refused("dimmer.ron", &whole, "another scene", "");
+    let lower = room().replace("1.2", "1.1");
+    fs::write(file("room.gltf"), lower).unwrap();
+    refused("room.ron", &whole, "another scene", "");
+}
+
+#[test]
+fn frames_do_not_depend_on_how_they_are_divided() {
+    let folder = folder();
+    let moving = ROOM.replace(
+        "LookAt(eye: (0.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), vfov: 45.0)",
+        "Path([
+            Key(frame: 0, eye: (0.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), vfov: 45.0),
+            Key(frame: 3, eye: (1.5, 1.2, 3.5), target: (0.0, 1.0, 0.0), vfov: 45.0),
+        ])",
+    );
+    fs::write(folder.path().join("walk.ron"), moving).unwrap();
+    let options = "--quiet --spp 2";
+    succeed(
+        &folder,
+        &format!("render walk.ron {options} --frames 0..4 --cache-out walk.cache -o one.##.exr"),
+    );
+    succeed(
+        &folder,
+        &format!("render walk.ron {options} --frames 0..2 --cache-in walk.cache -o two.##.exr"),
+    );
+    succeed(
+        &folder,
+        &format!("render walk.ron {options} --frames 2..=3 --cache-in walk.cache -o two.##.exr"),
+    );
+    for frame in 0..4 {
+        let [one, two] =
+            ["one", "two"].map(|name| pixels(&folder, &format!("{name}.0{frame}.exr")));
+        assert!(one == two, "frame {frame}");
+    }
+    assert!(
+        pixels(&folder, "one.00.exr") != pixels(&folder, "one.03.exr"),
+        "the camera moves"
+    );
+}
+
+#[test]
+fn a_sequence_needs_a_name_for_each_frame() {
+    let folder = folder();
+    let (status, stderr) = run(&folder, "render room.ron --frames 0..2 -o x.exr");
+    assert_eq!(status, Some(2));
+    assert!(stderr.contains("####"), "{stderr}");
+}
+
+#[test]
+fn a_cache_file_tells_what_it_holds() {
+    let folder = folder();
+    succeed(
+        &folder,
+        "render room.ron --quiet --cache-out room.cache --fill-only",
+    );
+    assert!(!Path::new(&folder.path().join("room-render.exr")).exists());
+    let output = run_tyndall(folder.path(), &["info", "room.cache", "--json"]);
+    let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(info["views"], 1);
+    assert!(
+        info["records"]["surface"]["count"].as_u64().unwrap() > 0,
+        "{info}"
+    );
+    let [least, median, most] =
+        [0, 1, 2].map(|i| info["records"]["surface"]["radius_m"][i].as_f64().unwrap());
+    assert!(0.0 < least && least <= median && median <= most);
+}
