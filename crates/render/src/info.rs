@@ -6,20 +6,22 @@ use crate::image::Image;
 use glam::Vec3;
 use serde::Serialize;
 use tyndall_media::{Density, Medium, PhaseFunction, Region};
-use tyndall_scene::Scene;
 use tyndall_scene::lights::{FlatEmitter, Light};
+use tyndall_scene::{CameraMotion, Scene};
 
 /// What a scene holds.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneInfo {
     /// Width and height of the image in pixels.
     pub film: [u32; 2],
-    /// Where the camera stands, m.
+    /// Where the camera stands, m; where it moves, at frame 0.
     pub eye: [f32; 3],
     /// Unit direction in which it looks.
     pub forward: [f32; 3],
     /// Its vertical field of view, degrees.
     pub vfov_degrees: f32,
+    /// How the camera moves; null where it stands still.
+    pub camera_path: Option<CameraPathInfo>,
     /// Smallest and largest coordinates of surfaces and bounded media, m; null where there are none.
     pub bounds_m: Option<[[f32; 3]; 2]>,
     /// Number of triangles.
@@ -40,6 +42,15 @@ pub struct SceneInfo {
     pub search_tree_mib: f64,
     /// What was repaired, ignored or will look odd.
     pub warnings: Vec<String>,
+}
+
+/// The way of a camera that moves.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CameraPathInfo {
+    /// The first and the last frame.
+    pub frames: [u32; 2],
+    /// How far the eye goes, m.
+    pub length_m: f64,
 }
 
 /// One light; a field that has no meaning for its kind is left out of the JSON.
@@ -113,6 +124,7 @@ impl SceneInfo {
             eye: scene.camera.eye().to_array(),
             forward: scene.camera.forward().to_array(),
             vfov_degrees: scene.camera.yfov().to_degrees(),
+            camera_path: scene.motion.as_ref().map(CameraPathInfo::of),
             bounds_m: bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
             triangles: scene.geometry.len(),
             materials: surfaces.materials.len(),
@@ -128,6 +140,17 @@ impl SceneInfo {
             texture_mib: mib(surfaces.textures.iter().map(|t| t.bytes()).sum()),
             search_tree_mib: mib(scene.geometry.bytes()),
             warnings: scene.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+impl CameraPathInfo {
+    /// Describes `motion`.
+    fn of(motion: &CameraMotion) -> Self {
+        let (first, last) = motion.frames().into_inner();
+        Self {
+            frames: [first, last],
+            length_m: motion.length(),
         }
     }
 }
@@ -319,6 +342,7 @@ mod tests {
         assert_eq!(info.film, [1024, 768]);
         assert!((info.vfov_degrees - 40.0).abs() < 1e-4);
         assert_eq!((info.triangles, info.textures), (0, 0));
+        assert_eq!(info.camera_path, None);
         let [point, sky] = info.lights.as_slice() else {
             panic!("{:?}", info.lights)
         };
@@ -339,6 +363,18 @@ mod tests {
             ("HenyeyGreenstein(g: 0.5)", "Constant(2.0)")
         );
         assert_eq!(fog.region, "Sphere(center: (0.0, 0.0, 0.0), radius: 2.0)");
+    }
+
+    #[test]
+    fn a_camera_path_tells_its_frames_and_its_length() {
+        let ron = "Scene(camera: Path([
+            Key(frame: 0, eye: (0, 1, 5), target: (0, 1, 0), vfov: 40),
+            Key(frame: 47, eye: (6, 1, -3), target: (6, 1, -9), vfov: 40)]))";
+        let info = SceneInfo::of(&load_str(ron, Path::new("."), &LoadOptions::default()).unwrap());
+        let path = info.camera_path.unwrap();
+        assert_eq!((info.eye, path.frames), ([0.0, 1.0, 5.0], [0, 47]));
+        // 6 m across and 8 m ahead; rounding of 4096 differences of f32 positions.
+        assert!((path.length_m - 10.0).abs() < 1e-3, "{}", path.length_m);
     }
 
     #[test]

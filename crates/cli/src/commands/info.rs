@@ -67,6 +67,15 @@ fn scene_text(scene: &SceneInfo) -> String {
             triple(scene.forward),
             scene.vfov_degrees
         ),
+    ];
+    lines.extend(scene.camera_path.as_ref().map(|path| {
+        let [first, last] = path.frames;
+        format!(
+            "path       frames {first} to {last}, {:.1} m",
+            path.length_m
+        )
+    }));
+    lines.extend([
         match scene.bounds_m {
             Some([min, max]) => format!("bounds     {} to {} m", triple(min), triple(max)),
             None => "bounds     none".to_owned(),
@@ -80,7 +89,7 @@ fn scene_text(scene: &SceneInfo) -> String {
             scene.mesh_mib, scene.texture_mib, scene.search_tree_mib
         ),
         format!("lights     {}", scene.lights.len()),
-    ];
+    ]);
     lines.extend(scene.lights.iter().take(LIGHTS_SHOWN).map(light_line));
     if scene.lights.len() > LIGHTS_SHOWN {
         lines.push(format!(
