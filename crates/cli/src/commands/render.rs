@@ -294,13 +294,6 @@ mod tests {
     }
 
     #[test]
-    fn files_of_records_are_refused_with_a_reason() {
-        let error = run(&args("sky.ron --cache-in records.tyc")).unwrap_err();
-        assert!(error.to_string().contains("not built yet"), "{error}");
-        assert_eq!(error.status(), 2);
-    }
-
-    #[test]
     fn bad_options_and_places_are_found_before_the_scene_is_opened() {
         for line in [
             "none.ron --spp 0",
