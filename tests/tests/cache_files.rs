@@ -109,33 +109,45 @@ fn kept_records_make_the_pixels_that_fresh_ones_make() {
     }
 }
 
-#[test]
-fn tiles_from_one_cache_file_make_up_the_whole_frame() {
+/// Renders a frame of `size` pixels whole and in parts, each part from the cache file that the whole left.
+fn tiles_make_up(size: [usize; 2], error: f32, crops: &[[usize; 4]]) {
     let folder = folder();
+    let [width, height] = size;
+    let frame =
+        format!("render room.ron --quiet --error {error} --width {width} --height {height}");
     succeed(
         &folder,
-        "render room.ron --quiet --cache-out room.cache -o whole.exr",
+        &format!("{frame} --cache-out room.cache -o whole.exr"),
     );
     let whole = pixels(&folder, "whole.exr");
-    // Borders within blocks of pixels, and beside them.
-    for (x, y, w, h) in [(0, 0, 9, 18), (9, 0, 13, 7), (9, 7, 13, 11), (21, 17, 1, 1)] {
+    for &[x, y, w, h] in crops {
         let crop = format!("--crop {x},{y},{w},{h}");
         succeed(
             &folder,
-            &format!("render room.ron --quiet --cache-in room.cache {crop} -o tile.exr"),
+            &format!("{frame} --cache-in room.cache {crop} -o tile.exr"),
         );
         let tile = pixels(&folder, "tile.exr");
         for (name, values) in &tile.samples {
             for (i, value) in values.iter().enumerate() {
                 let (column, row) = (x + i % w, y + i / w);
-                assert_eq!(
-                    *value,
-                    whole.samples[name][row * 22 + column],
-                    "{name} {column} {row}"
-                );
+                let expected = whole.samples[name][row * width + column];
+                assert_eq!(*value, expected, "{name} {column} {row}");
             }
         }
     }
+}
+
+#[test]
+fn tiles_from_one_cache_file_make_up_the_whole_frame() {
+    // Borders within blocks of pixels, and beside them.
+    let crops = [[0, 0, 9, 18], [9, 0, 13, 7], [9, 7, 13, 11], [21, 17, 1, 1]];
+    tiles_make_up([22, 18], 0.2, &crops);
+}
+
+#[test]
+fn tiles_make_up_frames_whose_pilot_looks_at_a_part() {
+    // More tiles than a pilot has, in few pixels.
+    tiles_make_up([3100, 4], 0.5, &[[31, 0, 50, 4], [3001, 1, 99, 2]]);
 }
 
 #[test]

@@ -286,7 +286,8 @@ impl<'s> Camera<'s> {
             .filter(|s| s.w_i.dot(hit.normal) > 0.0)
             .map_or(Vec3::ZERO, |s| {
                 let path = &mut sampler.branch(GLOSS_PART);
-                s.value / (survival * s.pdf) * gather::along(world, hit.spawn(s.w_i), sky, self.reach, path)
+                s.value / (survival * s.pdf)
+                    * gather::along(world, hit.spawn(s.w_i), sky, self.reach, path)
             })
     }
 
