@@ -106,53 +106,106 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
 
+    fn hg(g: f32) -> PhaseFunction {
+        PhaseFunction::henyey_greenstein(g).unwrap()
+    }
+
     #[test]
     fn phase_functions_conform() {
         conformance::check(&PhaseFunction::Isotropic);
         for g in [
-            0.0, 1e-7, -1e-3, 0.3, -0.5, 0.75, 0.9, -0.9, 0.99, 0.999, -0.999, 0.9999,
+            0.0, 1e-7, -1e-7, -1e-3, 0.3, -0.5, 0.75, 0.9, -0.9, 0.99, 0.999, -0.999, 0.9999,
+            -0.9999,
         ] {
-            conformance::check(&PhaseFunction::henyey_greenstein(g).unwrap());
+            conformance::check(&hg(g));
+        }
+    }
+
+    #[test]
+    fn moments_are_the_exact_ones() {
+        // exact-benchmarks.md E4, by quadrature with 30 digits.
+        for (phase, exact) in [
+            (hg(0.3), [0.3, 0.09, 0.027, 0.0081, 0.00243, 0.000729]),
+            (
+                hg(0.85),
+                [
+                    0.85,
+                    0.7225,
+                    0.614125,
+                    0.52200625,
+                    0.4437053125,
+                    0.377149515625,
+                ],
+            ),
+            (hg(-0.6), [-0.6, 0.36, -0.216, 0.1296, -0.07776, 0.046656]),
+            (
+                hg(0.99),
+                [
+                    0.99,
+                    0.9801,
+                    0.970299,
+                    0.96059601,
+                    0.9509900499,
+                    0.941480149401,
+                ],
+            ),
+        ] {
+            for (l, exact) in std::iter::once(1.0).chain(exact).enumerate() {
+                let found = f64::from(phase.moments(l));
+                // g is rounded to half an ulp, its l-th power l times and l more in multiplying.
+                let rounding = (2 * l) as f64 * f64::from(f32::EPSILON) / 2.0;
+                assert!(
+                    (found - exact).abs() <= rounding,
+                    "{phase:?}, moment {l}: {found}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn slope_and_curvature_are_differences_of_the_formula() {
+        let henyey_greenstein = |g: f64, mu: f64| {
+            (1.0 - g * g) / (1.0 + g * g - 2.0 * g * mu).powf(1.5) * f64::from(ISOTROPIC)
+        };
+        // Each phase function beside its textbook form in f64.
+        type Formula<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
+        let of_lobe =
+            |g: f32| -> Formula<'_> { Box::new(move |mu| henyey_greenstein(f64::from(g), mu)) };
+        let mut rows: Vec<(PhaseFunction, Formula<'_>)> = [-0.9, -0.7, 0.3, 0.8, 0.95]
+            .map(|g| (hg(g), of_lobe(g)))
+            .into();
+        rows.push((PhaseFunction::Isotropic, of_lobe(0.0)));
+        for (phase, formula) in &rows {
+            for angle in [0.1_f32, 0.3, 1.0, 1.5, 2.0, 3.0] {
+                let w_i = -Vec3::new(angle.sin(), 0.0, angle.cos());
+                let [p, slope, curvature] = phase.derivatives(Vec3::Z, w_i).map(f64::from);
+                assert_eq!(p as f32, phase.eval(Vec3::Z, w_i));
+                // The angle of the rounded vector.
+                let mu = -w_i.as_dvec3().normalize().z;
+                let h = 1e-5;
+                let [below, here, above] = [-h, 0.0, h].map(|h| formula(mu + h));
+                let differences = [
+                    (above - below) / (2.0 * h),
+                    (above - 2.0 * here + below) / (h * h),
+                ];
+                for (found, difference) in [slope, curvature].into_iter().zip(differences) {
+                    // The next derivatives add up to h²/12 · 63 g²/D² = 4e-6 in the narrowest peak, and rounding of the second
+                    // difference 4 ε/h² = 4e-6 of p; f32 adds 1e-6.
+                    let tolerance = 1e-5 * (difference.abs() + p);
+                    assert!(
+                        (found - difference).abs() <= tolerance,
+                        "{phase:?} at {angle}: {found} not {difference}"
+                    );
+                }
+            }
         }
     }
 
     #[test]
     fn only_equal_directions_count_as_isotropic() {
         assert!(PhaseFunction::default().is_isotropic());
-        assert!(
-            PhaseFunction::henyey_greenstein(0.0)
-                .unwrap()
-                .is_isotropic()
-        );
-        assert!(
-            !PhaseFunction::henyey_greenstein(1e-3)
-                .unwrap()
-                .is_isotropic()
-        );
-    }
-
-    #[test]
-    fn slope_and_curvature_are_those_of_the_value() {
-        let h = 1e-3_f32;
-        for g in [-0.7, 0.0, 0.3, 0.8] {
-            let phase = PhaseFunction::henyey_greenstein(g).unwrap();
-            for angle in [0.3_f32, 1.0, 2.0, 3.0] {
-                let w = |angle: f32| -Vec3::new(angle.sin(), 0.0, angle.cos());
-                let [below, here, above] =
-                    [h, 0.0, -h].map(|h| phase.derivatives(Vec3::Z, w(angle + h)));
-                assert_eq!(here[0], phase.eval(Vec3::Z, w(angle)));
-                for k in [0, 1] {
-                    let slope = (above[k] - below[k]) / ((angle - h).cos() - (angle + h).cos());
-                    // Rounding of the difference: 1e-7 of the function over a step of 2h sin(angle).
-                    let rounding = 5e-4 / angle.sin() * here[k].abs();
-                    let found = here[k + 1];
-                    assert!(
-                        (found - slope).abs() <= 1e-3 * slope.abs() + rounding,
-                        "{g} {angle}: {found} {slope}"
-                    );
-                }
-            }
-        }
+        assert!(hg(0.0).is_isotropic() && hg(-0.0).is_isotropic());
+        assert!(!hg(1e-3).is_isotropic());
     }
 
     #[test]
