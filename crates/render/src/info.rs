@@ -218,18 +218,24 @@ impl MediumInfo {
                     format!("Height(base: {base:?}, scale_height: {scale_height:?})")
                 }
             },
-            phase: match medium.phase() {
-                PhaseFunction::Isotropic => "Isotropic".to_owned(),
-                PhaseFunction::HenyeyGreenstein(_) => {
-                    format!("HenyeyGreenstein(g: {:?})", medium.phase().mean_cosine())
-                }
-            },
+            phase: written(medium.phase()),
             sigma_t_per_m: medium.sigma_t().to_array(),
             sigma_s_per_m: medium.sigma_s().to_array(),
             albedo: medium.albedo().to_array(),
             mean_free_path_m: medium.sigma_t().to_array().map(free_path),
             emission_w_m3_sr: medium.emission().to_array(),
         }
+    }
+}
+
+/// A phase function as the scene file writes it.
+fn written(phase: &PhaseFunction) -> String {
+    match phase {
+        PhaseFunction::Isotropic => "Isotropic".to_owned(),
+        PhaseFunction::HenyeyGreenstein(lobe) => {
+            format!("HenyeyGreenstein(g: {:?})", lobe.asymmetry().get())
+        }
+        PhaseFunction::Rayleigh => "Rayleigh".to_owned(),
     }
 }
 
@@ -339,6 +345,18 @@ mod tests {
             ("HenyeyGreenstein(g: 0.5)", "Constant(2.0)")
         );
         assert_eq!(fog.region, "Sphere(center: (0.0, 0.0, 0.0), radius: 2.0)");
+    }
+
+    #[test]
+    fn phase_functions_read_as_the_scene_file_writes_them() {
+        for text in ["Isotropic", "HenyeyGreenstein(g: -0.4)", "Rayleigh"] {
+            let ron = format!(
+                "Scene(camera: LookAt(eye: (0, 0, 5), target: (0, 0, 0), vfov: 40),
+                    media: [Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: {text})])"
+            );
+            let scene = load_str(&ron, Path::new("."), &LoadOptions::default()).unwrap();
+            assert_eq!(SceneInfo::of(&scene).media[0].phase, text);
+        }
     }
 
     #[test]

@@ -204,11 +204,13 @@ impl Assembly<'_> {
                     PhaseFunction::henyey_greenstein(lobe.g.get())
                         .map_err(|error| self.wrong_field(&format!("{field}.phase.g"), error))?
                 }
-                scene_file::media::PhaseFunction::Rayleigh => {
-                    return Err(self.unsupported_phase("Rayleigh", &field));
-                }
+                scene_file::media::PhaseFunction::Rayleigh => PhaseFunction::Rayleigh,
                 scene_file::media::PhaseFunction::Mixture(_) => {
-                    return Err(self.unsupported_phase("Mixture", &field));
+                    return Err(self.unsupported(
+                        "phase function Mixture",
+                        "use Isotropic, HenyeyGreenstein or Rayleigh",
+                        format!("{field}.phase"),
+                    ));
                 }
             },
             emission: medium.emission.0,
@@ -326,14 +328,6 @@ impl Assembly<'_> {
             place: self.place_of(&field),
             field,
         }
-    }
-
-    fn unsupported_phase(&self, what: &str, medium: &str) -> SceneError {
-        self.unsupported(
-            &format!("phase function {what}"),
-            "use Isotropic or HenyeyGreenstein",
-            format!("{medium}.phase"),
-        )
     }
 
     fn wrong(&self, problem: impl ToString) -> SceneError {

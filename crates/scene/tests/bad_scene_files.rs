@@ -107,7 +107,7 @@ const MEDIA: &[&str] = &[
     "phase: Mixture([(0.5, Isotropic)])",
     "phase: Mixture([(0.5, Isotropic), (0.5, HenyeyGreenstein(g: -1))])",
     "phase: Mixture([(0.5, Isotropic), (0.5, HenyeyGreenstein(g: -0.1))])",
-    "phase: Rayleigh",
+    "phase: Rayleigh()",
     r#"density: Grid(file: "a.vdb", transform: [1, 2, 3])"#,
     r#"density: Grid(file: "a.vdb", transform: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1])"#,
     r#"density: Grid(file: "a.vdb", transform: (1, 2, 3))"#,

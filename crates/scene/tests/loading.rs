@@ -4,6 +4,7 @@
 
 use glam::Vec3;
 use std::path::Path;
+use tyndall_media::PhaseFunction;
 use tyndall_scene::{Camera, Fog, LoadOptions, Scene, SceneError, Warning, load, load_str};
 
 fn scene(text: &str) -> Scene {
@@ -76,6 +77,21 @@ fn lamps_in_fog_need_no_gltf() {
 }
 
 #[test]
+fn phase_functions_of_a_scene_file_are_those_of_the_media() {
+    let hg = |g| PhaseFunction::henyey_greenstein(g).unwrap();
+    for (written, expected) in [
+        ("Isotropic", PhaseFunction::Isotropic),
+        ("HenyeyGreenstein(g: -0.4)", hg(-0.4)),
+        ("Rayleigh", PhaseFunction::Rayleigh),
+    ] {
+        let scene = scene(&format!(
+            "Scene({CAMERA}, media: [Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: {written})])"
+        ));
+        assert_eq!(scene.media.list()[0].phase(), &expected, "{written}");
+    }
+}
+
+#[test]
 fn the_summary_names_kinds_of_media_and_phase_functions() {
     for (media, summary) in [
         ("", "media: none"),
@@ -94,6 +110,16 @@ fn the_summary_names_kinds_of_media_and_phase_functions() {
         (
             "Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: HenyeyGreenstein(g: 0))",
             "media: 1 homogeneous; phase: isotropic",
+        ),
+        (
+            "Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: Rayleigh)",
+            "media: 1 homogeneous; phase: Rayleigh",
+        ),
+        (
+            "Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: HenyeyGreenstein()),
+             Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1)),
+             Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: Rayleigh)",
+            "media: 3 homogeneous; phase: isotropic, Henyey-Greenstein and Rayleigh",
         ),
     ] {
         assert_eq!(

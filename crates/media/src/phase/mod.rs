@@ -4,11 +4,14 @@
 //! it with one line.
 
 mod henyey_greenstein;
+mod rayleigh;
 
 pub use henyey_greenstein::{Asymmetry, AsymmetryError, HenyeyGreenstein};
 
 use glam::Vec3;
-use std::f32::consts::PI;
+use rayleigh::Rayleigh;
+use std::f32::consts::{PI, TAU};
+use tyndall_math::Frame;
 use tyndall_math::warp::uniform_sphere;
 
 /// A phase function: a density over directions, normalised to 1 over the sphere.
@@ -22,6 +25,8 @@ pub enum PhaseFunction {
     Isotropic,
     /// One lobe, forward for g > 0.
     HenyeyGreenstein(HenyeyGreenstein),
+    /// Forward as much as backward, half as much across: 3/(16π) (1 + μ²).
+    Rayleigh,
 }
 
 /// 1/4π, per steradian.
@@ -43,6 +48,7 @@ impl PhaseFunction {
         match self {
             Self::Isotropic => ISOTROPIC,
             Self::HenyeyGreenstein(hg) => hg.eval(w_o, w_i),
+            Self::Rayleigh => Rayleigh.eval(w_o, w_i),
         }
     }
 
@@ -52,6 +58,7 @@ impl PhaseFunction {
         match self {
             Self::Isotropic => [ISOTROPIC, 0.0, 0.0],
             Self::HenyeyGreenstein(hg) => hg.derivatives(w_o, w_i),
+            Self::Rayleigh => Rayleigh.derivatives(w_o, w_i),
         }
     }
 
@@ -62,6 +69,7 @@ impl PhaseFunction {
         match self {
             Self::Isotropic => (uniform_sphere(u), ISOTROPIC),
             Self::HenyeyGreenstein(hg) => hg.sample(w_o, u),
+            Self::Rayleigh => Rayleigh.sample(w_o, u),
         }
     }
 
@@ -86,6 +94,7 @@ impl PhaseFunction {
                 }
             }
             Self::HenyeyGreenstein(hg) => hg.moments(l),
+            Self::Rayleigh => Rayleigh.moments(l),
         }
     }
 
@@ -94,8 +103,19 @@ impl PhaseFunction {
         match self {
             Self::Isotropic => true,
             Self::HenyeyGreenstein(hg) => hg.asymmetry().get() == 0.0,
+            Self::Rayleigh => false,
         }
     }
+}
+
+/// The direction at an angle of given sine and cosine from `axis`, turned around it by `v` of a circle.
+fn around(axis: Vec3, (sin_theta, cos_theta): (f32, f32), v: f32) -> Vec3 {
+    let (sin_phi, cos_phi) = (TAU * v).sin_cos();
+    Frame::from_normal(axis).to_world(Vec3::new(
+        sin_theta * cos_phi,
+        sin_theta * sin_phi,
+        cos_theta,
+    ))
 }
 
 #[cfg(test)]
@@ -119,6 +139,7 @@ mod tests {
         ] {
             conformance::check(&hg(g));
         }
+        conformance::check(&PhaseFunction::Rayleigh);
     }
 
     #[test]
@@ -149,6 +170,7 @@ mod tests {
                     0.941480149401,
                 ],
             ),
+            (PhaseFunction::Rayleigh, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0]),
         ] {
             for (l, exact) in std::iter::once(1.0).chain(exact).enumerate() {
                 let found = f64::from(phase.moments(l));
@@ -171,10 +193,12 @@ mod tests {
         type Formula<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
         let of_lobe =
             |g: f32| -> Formula<'_> { Box::new(move |mu| henyey_greenstein(f64::from(g), mu)) };
+        let rayleigh = |mu: f64| 0.75 * (1.0 + mu * mu) * f64::from(ISOTROPIC);
         let mut rows: Vec<(PhaseFunction, Formula<'_>)> = [-0.9, -0.7, 0.3, 0.8, 0.95]
             .map(|g| (hg(g), of_lobe(g)))
             .into();
         rows.push((PhaseFunction::Isotropic, of_lobe(0.0)));
+        rows.push((PhaseFunction::Rayleigh, Box::new(rayleigh)));
         for (phase, formula) in &rows {
             for angle in [0.1_f32, 0.3, 1.0, 1.5, 2.0, 3.0] {
                 let w_i = -Vec3::new(angle.sin(), 0.0, angle.cos());
@@ -206,6 +230,7 @@ mod tests {
         assert!(PhaseFunction::default().is_isotropic());
         assert!(hg(0.0).is_isotropic() && hg(-0.0).is_isotropic());
         assert!(!hg(1e-3).is_isotropic());
+        assert!(!PhaseFunction::Rayleigh.is_isotropic());
     }
 
     #[test]
