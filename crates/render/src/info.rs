@@ -228,7 +228,7 @@ impl MediumInfo {
     }
 }
 
-/// A phase function as the scene file writes it.
+/// A phase function as the scene file writes it; mixtures inside mixtures are taken apart.
 fn written(phase: &PhaseFunction) -> String {
     match phase {
         PhaseFunction::Isotropic => "Isotropic".to_owned(),
@@ -236,6 +236,13 @@ fn written(phase: &PhaseFunction) -> String {
             format!("HenyeyGreenstein(g: {:?})", lobe.asymmetry().get())
         }
         PhaseFunction::Rayleigh => "Rayleigh".to_owned(),
+        PhaseFunction::Mixture(mixture) => {
+            let parts: Vec<_> = mixture
+                .parts()
+                .map(|(weight, phase)| format!("({weight:?}, {})", written(&phase)))
+                .collect();
+            format!("Mixture([{}])", parts.join(", "))
+        }
     }
 }
 
@@ -349,7 +356,12 @@ mod tests {
 
     #[test]
     fn phase_functions_read_as_the_scene_file_writes_them() {
-        for text in ["Isotropic", "HenyeyGreenstein(g: -0.4)", "Rayleigh"] {
+        for text in [
+            "Isotropic",
+            "HenyeyGreenstein(g: -0.4)",
+            "Rayleigh",
+            "Mixture([(0.7, HenyeyGreenstein(g: 0.8)), (0.2, Rayleigh), (0.1, Isotropic)])",
+        ] {
             let ron = format!(
                 "Scene(camera: LookAt(eye: (0, 0, 5), target: (0, 0, 0), vfov: 40),
                     media: [Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: {text})])"

@@ -198,21 +198,10 @@ impl Assembly<'_> {
             })?,
             sigma_t: medium.sigma_t.0,
             albedo: medium.albedo.0,
-            phase: match &medium.phase {
-                scene_file::media::PhaseFunction::Isotropic => PhaseFunction::Isotropic,
-                scene_file::media::PhaseFunction::HenyeyGreenstein(lobe) => {
-                    PhaseFunction::henyey_greenstein(lobe.g.get())
-                        .map_err(|error| self.wrong_field(&format!("{field}.phase.g"), error))?
-                }
-                scene_file::media::PhaseFunction::Rayleigh => PhaseFunction::Rayleigh,
-                scene_file::media::PhaseFunction::Mixture(_) => {
-                    return Err(self.unsupported(
-                        "phase function Mixture",
-                        "use Isotropic, HenyeyGreenstein or Rayleigh",
-                        format!("{field}.phase"),
-                    ));
-                }
-            },
+            phase: medium
+                .phase
+                .placed()
+                .map_err(|error| self.wrong_field(&format!("{field}.phase"), error))?,
             emission: medium.emission.0,
         };
         Medium::new(params).map_err(|error| self.wrong_field(&field, error))

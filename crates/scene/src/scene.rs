@@ -92,13 +92,14 @@ fn phases(media: &[Medium]) -> String {
         }
         PhaseFunction::Isotropic | PhaseFunction::HenyeyGreenstein(_) => "isotropic",
         PhaseFunction::Rayleigh => "Rayleigh",
+        PhaseFunction::Mixture(_) => "mixture",
     };
     let there: Vec<_> = media
         .iter()
         .filter(|medium| medium.sigma_s() != Vec3::ZERO)
         .map(kind)
         .collect();
-    let mut names = vec!["isotropic", "Henyey-Greenstein", "Rayleigh"];
+    let mut names = vec!["isotropic", "Henyey-Greenstein", "Rayleigh", "mixture"];
     names.retain(|name| there.contains(name));
     match names.as_slice() {
         [] => "none".into(),

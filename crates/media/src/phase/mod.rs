@@ -1,12 +1,14 @@
 //! Phase functions: in which directions a medium scatters.
 //!
-//! A new one is a file beside `henyey_greenstein.rs` and a variant of [`PhaseFunction`]; the conformance suite then tests
-//! it with one line.
+//! A new one is a file beside `henyey_greenstein.rs`, a variant of [`PhaseFunction`], and one of `Shape` so that it mixes; the
+//! conformance suite then tests it with one line.
 
 mod henyey_greenstein;
+mod mixture;
 mod rayleigh;
 
 pub use henyey_greenstein::{Asymmetry, AsymmetryError, HenyeyGreenstein};
+pub use mixture::{MAX_LOBES, Mixture, MixtureError};
 
 use glam::Vec3;
 use rayleigh::Rayleigh;
@@ -27,6 +29,8 @@ pub enum PhaseFunction {
     HenyeyGreenstein(HenyeyGreenstein),
     /// Forward as much as backward, half as much across: 3/(16π) (1 + μ²).
     Rayleigh,
+    /// Several at once.
+    Mixture(Mixture),
 }
 
 /// 1/4π, per steradian.
@@ -43,12 +47,24 @@ impl PhaseFunction {
         )))
     }
 
+    /// The phase function that scatters as each of `parts` does in proportion to its weight; weights are scaled to add up to 1.
+    ///
+    /// Mixtures among the parts are taken apart and equal parts added up; one phase function alone is itself, not a mixture.
+    ///
+    /// # Errors
+    /// Where a weight is negative or not finite, none is above 0, or more than [`MAX_LOBES`] different phase functions are left.
+    pub fn mixture(parts: &[(f32, Self)]) -> Result<Self, MixtureError> {
+        mixture::mix(parts)
+    }
+
     /// Fraction of light scattered from `w_i` into `w_o`, per steradian.
+    #[inline]
     pub fn eval(&self, w_o: Vec3, w_i: Vec3) -> f32 {
         match self {
             Self::Isotropic => ISOTROPIC,
             Self::HenyeyGreenstein(hg) => hg.eval(w_o, w_i),
             Self::Rayleigh => Rayleigh.eval(w_o, w_i),
+            Self::Mixture(mixture) => mixture.eval(w_o, w_i),
         }
     }
 
@@ -59,21 +75,25 @@ impl PhaseFunction {
             Self::Isotropic => [ISOTROPIC, 0.0, 0.0],
             Self::HenyeyGreenstein(hg) => hg.derivatives(w_o, w_i),
             Self::Rayleigh => Rayleigh.derivatives(w_o, w_i),
+            Self::Mixture(mixture) => mixture.derivatives(w_o, w_i),
         }
     }
 
     /// A direction `w_i` drawn in proportion to [`PhaseFunction::eval`], and its density per steradian, which is that very value.
     ///
     /// `u` holds two numbers in [0, 1).
+    #[inline]
     pub fn sample(&self, w_o: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         match self {
             Self::Isotropic => (uniform_sphere(u), ISOTROPIC),
             Self::HenyeyGreenstein(hg) => hg.sample(w_o, u),
             Self::Rayleigh => Rayleigh.sample(w_o, u),
+            Self::Mixture(mixture) => mixture.sample(w_o, u),
         }
     }
 
     /// Density per steradian with which [`PhaseFunction::sample`] picks `w_i`.
+    #[inline]
     pub fn pdf(&self, w_o: Vec3, w_i: Vec3) -> f32 {
         self.eval(w_o, w_i)
     }
@@ -95,6 +115,7 @@ impl PhaseFunction {
             }
             Self::HenyeyGreenstein(hg) => hg.moments(l),
             Self::Rayleigh => Rayleigh.moments(l),
+            Self::Mixture(mixture) => mixture.moments(l),
         }
     }
 
@@ -103,12 +124,14 @@ impl PhaseFunction {
         match self {
             Self::Isotropic => true,
             Self::HenyeyGreenstein(hg) => hg.asymmetry().get() == 0.0,
-            Self::Rayleigh => false,
+            // Lobes of a mixture differ, and none of them is a sum of others.
+            Self::Rayleigh | Self::Mixture(_) => false,
         }
     }
 }
 
 /// The direction at an angle of given sine and cosine from `axis`, turned around it by `v` of a circle.
+#[inline]
 fn around(axis: Vec3, (sin_theta, cos_theta): (f32, f32), v: f32) -> Vec3 {
     let (sin_phi, cos_phi) = (TAU * v).sin_cos();
     Frame::from_normal(axis).to_world(Vec3::new(
@@ -130,6 +153,10 @@ mod tests {
         PhaseFunction::henyey_greenstein(g).unwrap()
     }
 
+    fn mix(parts: &[(f32, PhaseFunction)]) -> PhaseFunction {
+        PhaseFunction::mixture(parts).unwrap()
+    }
+
     #[test]
     fn phase_functions_conform() {
         conformance::check(&PhaseFunction::Isotropic);
@@ -140,6 +167,14 @@ mod tests {
             conformance::check(&hg(g));
         }
         conformance::check(&PhaseFunction::Rayleigh);
+        conformance::check(&mix(&[(0.7, hg(0.8)), (0.3, hg(-0.3))]));
+        conformance::check(&mix(&[
+            (0.01, hg(0.9999)),
+            (0.9, PhaseFunction::Rayleigh),
+            (0.09, PhaseFunction::Isotropic),
+        ]));
+        let eight = [-0.9, -0.6, -0.3, -0.1, 0.2, 0.5, 0.8, 0.95].map(|g| (0.125, hg(g)));
+        conformance::check(&mix(&eight));
     }
 
     #[test]
@@ -171,6 +206,10 @@ mod tests {
                 ],
             ),
             (PhaseFunction::Rayleigh, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0]),
+            (
+                mix(&[(0.7, hg(0.8)), (0.3, hg(-0.3))]),
+                [0.47, 0.475, 0.3503, 0.28915, 0.228647, 0.1837195],
+            ),
         ] {
             for (l, exact) in std::iter::once(1.0).chain(exact).enumerate() {
                 let found = f64::from(phase.moments(l));
@@ -199,6 +238,17 @@ mod tests {
             .into();
         rows.push((PhaseFunction::Isotropic, of_lobe(0.0)));
         rows.push((PhaseFunction::Rayleigh, Box::new(rayleigh)));
+        rows.push((
+            mix(&[
+                (0.5, hg(0.75)),
+                (0.25, hg(-0.5)),
+                (0.25, PhaseFunction::Rayleigh),
+            ]),
+            Box::new(|mu| {
+                0.5 * henyey_greenstein(0.75, mu)
+                    + 0.25 * (henyey_greenstein(-0.5, mu) + rayleigh(mu))
+            }),
+        ));
         for (phase, formula) in &rows {
             for angle in [0.1_f32, 0.3, 1.0, 1.5, 2.0, 3.0] {
                 let w_i = -Vec3::new(angle.sin(), 0.0, angle.cos());
@@ -229,8 +279,10 @@ mod tests {
     fn only_equal_directions_count_as_isotropic() {
         assert!(PhaseFunction::default().is_isotropic());
         assert!(hg(0.0).is_isotropic() && hg(-0.0).is_isotropic());
+        assert!(mix(&[(0.5, hg(0.0)), (0.5, PhaseFunction::Isotropic)]).is_isotropic());
         assert!(!hg(1e-3).is_isotropic());
         assert!(!PhaseFunction::Rayleigh.is_isotropic());
+        assert!(!mix(&[(0.5, hg(0.5)), (0.5, hg(-0.5))]).is_isotropic());
     }
 
     #[test]

@@ -30,6 +30,7 @@ impl Rayleigh {
     }
 
     /// A direction `w_i` drawn in proportion to [`Rayleigh::eval`], and that value.
+    #[inline(never)]
     pub(super) fn sample(self, w_o: Vec3, [u, v]: [f32; 2]) -> (Vec3, f32) {
         let w_i = super::around(-w_o, sample_angle(u), v);
         (w_i, self.eval(w_o, w_i))
