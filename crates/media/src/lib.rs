@@ -67,7 +67,9 @@ pub use gradient::EndGradients;
 pub use march::{ExtinctionField, MovingSegment, SmoothExtinctionField};
 pub use media::Media;
 pub use medium::{MAX_SIGMA_T, MIN_SCALE_HEIGHT, Medium, MediumError, MediumParams};
-pub use phase::{Asymmetry, AsymmetryError, HenyeyGreenstein, PhaseFunction};
+pub use phase::{
+    Asymmetry, AsymmetryError, HenyeyGreenstein, Mixture, MixtureError, PhaseFunction,
+};
 pub use point::{MediumPoint, PhaseValue};
 pub use region::Region;
 pub use segment::{Segment, absorptance, transmittance};

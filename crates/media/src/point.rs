@@ -214,7 +214,7 @@ impl<'a> MediumPoint<'a> {
 }
 
 /// The largest f32 below 1.
-const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+pub(crate) const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 #[cfg(test)]
 mod tests {

@@ -241,17 +241,30 @@ impl MediumInfo {
                     format!("Height(base: {base:?}, scale_height: {scale_height:?})")
                 }
             },
-            phase: match medium.phase() {
-                PhaseFunction::Isotropic => "Isotropic".to_owned(),
-                PhaseFunction::HenyeyGreenstein(_) => {
-                    format!("HenyeyGreenstein(g: {:?})", medium.phase().mean_cosine())
-                }
-            },
+            phase: written(medium.phase()),
             sigma_t_per_m: medium.sigma_t().to_array(),
             sigma_s_per_m: medium.sigma_s().to_array(),
             albedo: medium.albedo().to_array(),
             mean_free_path_m: medium.sigma_t().to_array().map(free_path),
             emission_w_m3_sr: medium.emission().to_array(),
+        }
+    }
+}
+
+/// A phase function as the scene file writes it; mixtures inside mixtures are taken apart.
+fn written(phase: &PhaseFunction) -> String {
+    match phase {
+        PhaseFunction::Isotropic => "Isotropic".to_owned(),
+        PhaseFunction::HenyeyGreenstein(lobe) => {
+            format!("HenyeyGreenstein(g: {:?})", lobe.asymmetry().get())
+        }
+        PhaseFunction::Rayleigh => "Rayleigh".to_owned(),
+        PhaseFunction::Mixture(mixture) => {
+            let parts: Vec<_> = mixture
+                .parts()
+                .map(|(weight, phase)| format!("({weight:?}, {})", written(&phase)))
+                .collect();
+            format!("Mixture([{}])", parts.join(", "))
         }
     }
 }
@@ -375,6 +388,23 @@ mod tests {
         assert_eq!((info.eye, path.frames), ([0.0, 1.0, 5.0], [0, 47]));
         // 6 m across and 8 m ahead; rounding of 4096 differences of f32 positions.
         assert!((path.length_m - 10.0).abs() < 1e-3, "{}", path.length_m);
+    }
+
+    #[test]
+    fn phase_functions_read_as_the_scene_file_writes_them() {
+        for text in [
+            "Isotropic",
+            "HenyeyGreenstein(g: -0.4)",
+            "Rayleigh",
+            "Mixture([(0.7, HenyeyGreenstein(g: 0.8)), (0.2, Rayleigh), (0.1, Isotropic)])",
+        ] {
+            let ron = format!(
+                "Scene(camera: LookAt(eye: (0, 0, 5), target: (0, 0, 0), vfov: 40),
+                    media: [Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: {text})])"
+            );
+            let scene = load_str(&ron, Path::new("."), &LoadOptions::default()).unwrap();
+            assert_eq!(SceneInfo::of(&scene).media[0].phase, text);
+        }
     }
 
     #[test]

@@ -209,19 +209,10 @@ impl Assembly<'_> {
             })?,
             sigma_t: medium.sigma_t.0,
             albedo: medium.albedo.0,
-            phase: match &medium.phase {
-                scene_file::media::PhaseFunction::Isotropic => PhaseFunction::Isotropic,
-                scene_file::media::PhaseFunction::HenyeyGreenstein(lobe) => {
-                    PhaseFunction::henyey_greenstein(lobe.g.get())
-                        .map_err(|error| self.wrong_field(&format!("{field}.phase.g"), error))?
-                }
-                scene_file::media::PhaseFunction::Rayleigh => {
-                    return Err(self.unsupported_phase("Rayleigh", &field));
-                }
-                scene_file::media::PhaseFunction::Mixture(_) => {
-                    return Err(self.unsupported_phase("Mixture", &field));
-                }
-            },
+            phase: medium
+                .phase
+                .placed()
+                .map_err(|error| self.wrong_field(&format!("{field}.phase"), error))?,
             emission: medium.emission.0,
         };
         Medium::new(params).map_err(|error| self.wrong_field(&field, error))
@@ -358,14 +349,6 @@ impl Assembly<'_> {
             place: self.place_of(&field),
             field,
         }
-    }
-
-    fn unsupported_phase(&self, what: &str, medium: &str) -> SceneError {
-        self.unsupported(
-            &format!("phase function {what}"),
-            "use Isotropic or HenyeyGreenstein",
-            format!("{medium}.phase"),
-        )
     }
 
     fn wrong(&self, problem: impl ToString) -> SceneError {

@@ -10,7 +10,7 @@ use glam::Vec3;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use tyndall_math::Aabb;
-use tyndall_media::{Density, Media, Medium};
+use tyndall_media::{Density, Media, Medium, PhaseFunction};
 use tyndall_transport::World;
 
 /// Everything that is needed to render an image. Made by [`load`](crate::load()) and [`load_str`](crate::load_str).
@@ -107,19 +107,26 @@ impl Scene {
     }
 }
 
-/// The phase functions of all media that scatter.
-fn phases(media: &[Medium]) -> &'static str {
-    let scatters = |medium: &&Medium| medium.sigma_s() != Vec3::ZERO;
-    let mut isotropic = media
-        .iter()
-        .filter(scatters)
-        .map(|medium| medium.phase().is_isotropic());
-    let Some(first) = isotropic.next() else {
-        return "none";
+/// The kinds of phase functions of all media that scatter.
+fn phases(media: &[Medium]) -> String {
+    let kind = |medium: &Medium| match medium.phase() {
+        PhaseFunction::HenyeyGreenstein(lobe) if lobe.asymmetry().get() != 0.0 => {
+            "Henyey-Greenstein"
+        }
+        PhaseFunction::Isotropic | PhaseFunction::HenyeyGreenstein(_) => "isotropic",
+        PhaseFunction::Rayleigh => "Rayleigh",
+        PhaseFunction::Mixture(_) => "mixture",
     };
-    match (first, isotropic.all(|other| other == first)) {
-        (_, false) => "isotropic and Henyey-Greenstein",
-        (true, true) => "isotropic",
-        (false, true) => "Henyey-Greenstein",
+    let there: Vec<_> = media
+        .iter()
+        .filter(|medium| medium.sigma_s() != Vec3::ZERO)
+        .map(kind)
+        .collect();
+    let mut names = vec!["isotropic", "Henyey-Greenstein", "Rayleigh", "mixture"];
+    names.retain(|name| there.contains(name));
+    match names.as_slice() {
+        [] => "none".into(),
+        [one] => String::from(*one),
+        [others @ .., last] => format!("{} and {last}", others.join(", ")),
     }
 }

@@ -121,8 +121,11 @@ const MEDIA: &[&str] = &[
     "phase: Isotropic()",
     "phase: Mixture([(0.5, Isotropic)])",
     "phase: Mixture([(0.5, Isotropic), (0.5, HenyeyGreenstein(g: -1))])",
-    "phase: Mixture([(0.5, Isotropic), (0.5, HenyeyGreenstein(g: -0.1))])",
-    "phase: Rayleigh",
+    "phase: Mixture([])",
+    "phase: Mixture([(0.1, Rayleigh), (0.1, Isotropic), (0.1, HenyeyGreenstein(g: 0.1)), (0.1, HenyeyGreenstein(g: 0.2)), (0.6, Mixture([
+        (0.2, HenyeyGreenstein(g: 0.3)), (0.2, HenyeyGreenstein(g: 0.4)), (0.2, HenyeyGreenstein(g: 0.5)), (0.2, HenyeyGreenstein(g: 0.6)),
+        (0.2, HenyeyGreenstein(g: 0.7))]))])",
+    "phase: Rayleigh()",
     r#"density: Grid(file: "a.vdb", transform: [1, 2, 3])"#,
     r#"density: Grid(file: "a.vdb", transform: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1])"#,
     r#"density: Grid(file: "a.vdb", transform: (1, 2, 3))"#,

@@ -7,6 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::path::Path;
+use tyndall_media::PhaseFunction;
 use tyndall_scene::{Camera, Fog, LoadOptions, Scene, SceneError, Warning, load, load_str};
 
 fn scene(text: &str) -> Scene {
@@ -79,6 +80,34 @@ fn lamps_in_fog_need_no_gltf() {
 }
 
 #[test]
+fn phase_functions_of_a_scene_file_are_those_of_the_media() {
+    let hg = |g| PhaseFunction::henyey_greenstein(g).unwrap();
+    let mixture = |parts: &[_]| PhaseFunction::mixture(parts).unwrap();
+    for (written, expected) in [
+        ("Isotropic", PhaseFunction::Isotropic),
+        ("HenyeyGreenstein(g: -0.4)", hg(-0.4)),
+        ("Rayleigh", PhaseFunction::Rayleigh),
+        (
+            "Mixture([(0.8, HenyeyGreenstein(g: 0.8)), (0.2, Isotropic)])",
+            mixture(&[(0.8, hg(0.8)), (0.2, PhaseFunction::Isotropic)]),
+        ),
+        (
+            "Mixture([(0.5, Rayleigh), (0.5, Mixture([(0.5, Rayleigh), (0.5, HenyeyGreenstein(g: 0.9))]))])",
+            mixture(&[(0.75, PhaseFunction::Rayleigh), (0.25, hg(0.9))]),
+        ),
+        (
+            "Mixture([(1, Rayleigh), (0, HenyeyGreenstein())])",
+            PhaseFunction::Rayleigh,
+        ),
+    ] {
+        let scene = scene(&format!(
+            "Scene({CAMERA}, media: [Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: {written})])"
+        ));
+        assert_eq!(scene.media.list()[0].phase(), &expected, "{written}");
+    }
+}
+
+#[test]
 fn the_summary_names_kinds_of_media_and_phase_functions() {
     for (media, summary) in [
         ("", "media: none"),
@@ -97,6 +126,17 @@ fn the_summary_names_kinds_of_media_and_phase_functions() {
         (
             "Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: HenyeyGreenstein(g: 0))",
             "media: 1 homogeneous; phase: isotropic",
+        ),
+        (
+            "Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: Rayleigh)",
+            "media: 1 homogeneous; phase: Rayleigh",
+        ),
+        (
+            "Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: Mixture([(0.9, HenyeyGreenstein()), (0.1, Rayleigh)])),
+             Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1)),
+             Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: Rayleigh),
+             Medium(sigma_t: (1, 1, 1), albedo: (1, 1, 1), phase: Mixture([(1, HenyeyGreenstein())]))",
+            "media: 4 homogeneous; phase: isotropic, Henyey-Greenstein, Rayleigh and mixture",
         ),
     ] {
         assert_eq!(

@@ -17,11 +17,12 @@ const N_SAMPLES: u64 = 200_000;
 /// Panels on either side of the equator: the last reaches 1 − |μ| = 2⁻⁴⁴, 10⁻⁶ rad.
 const PANELS: i32 = 44;
 
-/// Checks normalisation, moments, sampled = evaluated, reciprocity, and the χ² of samples, around several directions.
+/// Checks normalisation, moments, derivatives, sampled = evaluated, reciprocity, and the χ² of samples, around several directions.
 pub(super) fn check(phase: &PhaseFunction) {
     let oblique = Vec3::new(0.36, -0.48, 0.8).normalize();
     // Around an axis, where f32 directions are fine enough for the narrowest peak.
     moments_are_integrals(phase, Vec3::Z);
+    derivatives_integrate_to_differences(phase, Vec3::Z);
     for w_o in [Vec3::Z, Vec3::NEG_Y, oblique] {
         is_reciprocal(phase, w_o);
         samples_follow_the_density(phase, w_o);
@@ -65,14 +66,19 @@ impl Height {
     }
 }
 
+/// The heights between which panel `n` of either side lies.
+fn ends(n: i32) -> [f64; 2] {
+    let high = 0.5_f64.powi(n);
+    [high, if n == PANELS { 0.0 } else { 0.5 * high }]
+}
+
 /// Heights and weights (in μ) of a quadrature over each panel, in the order of [`Height::panel`].
 fn panels() -> Vec<Vec<(Height, f64)>> {
     let rule = gauss_legendre(16);
     (0..=PANELS)
         .flat_map(|n| [(n, false), (n, true)])
         .map(|(n, forward)| {
-            let high = 0.5_f64.powi(n);
-            let low = if n == PANELS { 0.0 } else { 0.5 * high };
+            let [high, low] = ends(n);
             rule.iter()
                 .map(|(x, weight)| {
                     let half = 0.5 * (high - low);
@@ -114,6 +120,38 @@ fn moments_are_integrals(phase: &PhaseFunction, w_o: Vec3) {
     }
     assert_eq!(phase.moments(0), 1.0);
     assert_eq!(phase.mean_cosine(), phase.moments(1));
+}
+
+/// ∫ p′ dμ over a panel is the difference of p between its ends, and so on: that asks for no small differences of f32 values.
+fn derivatives_integrate_to_differences(phase: &PhaseFunction, w_o: Vec3) {
+    let at = |height: Height| {
+        let w_i = height.direction(w_o, 1.0);
+        let derivatives = phase.derivatives(w_o, w_i);
+        assert_eq!(derivatives[0], phase.eval(w_o, w_i));
+        derivatives.map(f64::from)
+    };
+    for panel in panels() {
+        let forward = panel[0].0.forward;
+        let [outer, inner] =
+            ends(panel[0].0.panel() as i32 / 2).map(|to_pole| at(Height { to_pole, forward }));
+        for k in [0, 1] {
+            let integral: f64 = panel
+                .iter()
+                .map(|&(height, weight)| weight * at(height)[k + 1])
+                .sum();
+            let difference = if forward {
+                inner[k] - outer[k]
+            } else {
+                outer[k] - inner[k]
+            };
+            let largest = inner[k].abs().max(outer[k].abs());
+            assert!(
+                (integral - difference).abs() <= ROUNDING * largest,
+                "{phase:?}, derivative {}: {integral}, not {difference} from {outer:?} to {inner:?}",
+                k + 1
+            );
+        }
+    }
 }
 
 fn is_reciprocal(phase: &PhaseFunction, w_o: Vec3) {

@@ -3,9 +3,8 @@
 //! Textbook forms lose all digits near the peak and around g = 0; those here are algebraically the same and keep seven.
 
 use glam::Vec3;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 use thiserror::Error;
-use tyndall_math::Frame;
 
 /// A mean cosine strictly between −1 and 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
@@ -92,14 +91,7 @@ impl HenyeyGreenstein {
     /// A direction `w_i` drawn in proportion to [`HenyeyGreenstein::eval`], and that value.
     pub fn sample(&self, w_o: Vec3, [u, v]: [f32; 2]) -> (Vec3, f32) {
         let (a, peak) = self.peak(w_o);
-        let (sin_theta, cos_theta) = sample_lobe(a, u);
-        let (sin_phi, cos_phi) = (TAU * v).sin_cos();
-        let frame = Frame::from_normal(peak);
-        let w_i = frame.to_world(Vec3::new(
-            sin_theta * cos_phi,
-            sin_theta * sin_phi,
-            cos_theta,
-        ));
+        let w_i = super::around(peak, sample_lobe(a, u), v);
         (w_i, self.eval(w_o, w_i))
     }
 
@@ -136,9 +128,9 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
 
-    const ASYMMETRIES: [f32; 18] = [
-        1e-8, 1e-7, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.9, 0.99, 0.999, 0.9999, -1e-7, -1e-3, -0.5,
-        -0.9, -0.999, -0.9999,
+    const ASYMMETRIES: [f32; 24] = [
+        1e-8, 1e-7, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.9, 0.99, 0.999, 0.9999, -1e-8, -1e-7,
+        -1e-5, -1e-4, -1e-3, -0.01, -0.1, -0.5, -0.9, -0.99, -0.999, -0.9999,
     ];
 
     fn hg(g: f32) -> HenyeyGreenstein {

@@ -220,6 +220,21 @@ pub enum PhaseFunction {
     Mixture(Mixture),
 }
 
+impl PhaseFunction {
+    /// The same phase function as light transport knows it; what keeps it from being one is the error.
+    pub fn placed(&self) -> Result<tyndall_media::PhaseFunction, String> {
+        match self {
+            Self::Isotropic => Ok(tyndall_media::PhaseFunction::Isotropic),
+            Self::HenyeyGreenstein(lobe) => {
+                tyndall_media::PhaseFunction::henyey_greenstein(lobe.g.get())
+                    .map_err(|error| error.to_string())
+            }
+            Self::Rayleigh => Ok(tyndall_media::PhaseFunction::Rayleigh),
+            Self::Mixture(mixture) => mix(&mixture.0),
+        }
+    }
+}
+
 /// `HenyeyGreenstein(g: 0.7)`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -233,7 +248,8 @@ fn forward() -> Asymmetry {
     Asymmetry::FORWARD
 }
 
-/// `Mixture([(0.8, HenyeyGreenstein(g: 0.8)), (0.2, Isotropic)])`, with weights that add up to 1.
+/// `Mixture([(0.8, HenyeyGreenstein(g: 0.8)), (0.2, Isotropic)])`, with weights that add up to 1 and no more different parts
+/// than [`tyndall_media::phase::MAX_LOBES`].
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Vec<(Fraction, PhaseFunction)>")]
 pub struct Mixture(pub Vec<(Fraction, PhaseFunction)>);
@@ -246,12 +262,22 @@ impl TryFrom<Vec<(Fraction, PhaseFunction)>> for Mixture {
 
     fn try_from(parts: Vec<(Fraction, PhaseFunction)>) -> Result<Self, Self::Error> {
         let sum: f32 = parts.iter().map(|(weight, _)| weight.get()).sum();
-        if (sum - 1.0).abs() <= WEIGHT_ROUNDING {
-            Ok(Self(parts))
+        if parts.is_empty() {
+            Err("an empty mixture; it needs parts with weights that add up to 1".into())
+        } else if (sum - 1.0).abs() <= WEIGHT_ROUNDING {
+            mix(&parts).map(|_| Self(parts))
         } else {
             Err(format!(
                 "the weights of the mixture add up to {sum}; they must add up to 1"
             ))
         }
     }
+}
+
+fn mix(parts: &[(Fraction, PhaseFunction)]) -> Result<tyndall_media::PhaseFunction, String> {
+    let parts: Vec<_> = parts
+        .iter()
+        .map(|(weight, phase)| Ok((weight.get(), phase.placed()?)))
+        .collect::<Result<_, String>>()?;
+    tyndall_media::PhaseFunction::mixture(&parts).map_err(|error| error.to_string())
 }
