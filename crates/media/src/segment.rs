@@ -1,6 +1,6 @@
 //! A ray through the media: optical depth as a function of distance, and back.
 //!
-//! The media met are found once; what is asked of the ray afterwards costs a closed form for each of them.
+//! The media met are found once; what is asked of the ray afterwards costs a closed form for each of them, or a few cells of a grid.
 
 use crate::Medium;
 use crate::density::Profile;
@@ -15,10 +15,10 @@ pub struct Segment<'a> {
 }
 
 /// The stretch of a ray inside one medium.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Piece<'a> {
     medium: &'a Medium,
-    profile: Profile,
+    profile: Profile<'a>,
     // f64: a short stretch far along the ray is the small difference of its ends.
     t0: f64,
     t1: f64,
@@ -31,7 +31,7 @@ impl<'a> Piece<'a> {
         if medium.is_vacuum() {
             return None;
         }
-        let (t0, t1) = medium.region().clip_line(line, t_max)?;
+        let (t0, t1) = medium.clip(line, t_max)?;
         Some(Self {
             medium,
             profile: medium.density().along(line),
@@ -108,7 +108,8 @@ impl<'a> Segment<'a> {
         // A loop: `collect` into a `SmallVec` costs some hundred instructions even for one medium.
         let mut pieces = SmallVec::new();
         for medium in media {
-            if let Some(piece) = Piece::new(medium, line, t_max.into()) {
+            if let Some(mut piece) = Piece::new(medium, line, t_max.into()) {
+                piece.profile.prepare(piece.t0, piece.t1);
                 pieces.push(piece);
             }
         }
@@ -162,7 +163,7 @@ impl<'a> Segment<'a> {
     /// [`Segment::optical_depth`]. `None` where the whole segment holds less.
     ///
     /// Never inside a gap or before the first medium of that channel: depth 0 is reached where the medium begins.
-    /// Closed form for one medium and for constant densities, Newton's method otherwise.
+    /// Closed form for one medium and for constant densities, Newton's method otherwise and in the cell of a grid.
     pub fn distance_at(&self, channel: usize, tau: f32) -> Option<f32> {
         let tau = f64::from(tau);
         let t = if let [piece] = self.pieces.as_slice() {

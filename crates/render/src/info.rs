@@ -195,10 +195,7 @@ impl LightInfo {
 
 impl MediumInfo {
     fn of(medium: &Medium) -> Self {
-        let densest = match medium.density() {
-            Density::Constant(density) => *density,
-            Density::Height { .. } => 1.0,
-        };
+        let densest = medium.density().max();
         let free_path =
             |sigma_t: f32| Some(1.0 / (sigma_t * densest)).filter(|path| path.is_finite());
         Self {
@@ -217,6 +214,7 @@ impl MediumInfo {
                 Density::Height { base, scale_height } => {
                     format!("Height(base: {base:?}, scale_height: {scale_height:?})")
                 }
+                Density::Grid(grid) => format!("Grid(scale: {:?})", grid.scale()),
             },
             phase: match medium.phase() {
                 PhaseFunction::Isotropic => "Isotropic".to_owned(),
