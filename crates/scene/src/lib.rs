@@ -52,6 +52,7 @@ pub mod scene;
 pub mod scene_file;
 pub mod texture;
 pub mod triangles;
+pub mod volume_file;
 pub mod watertight;
 
 pub use camera::{Camera, CameraError};
