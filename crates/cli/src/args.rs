@@ -26,7 +26,7 @@ pub(crate) enum Command {
     Probe(ProbeArgs),
     /// Tell how far an image is from a reference.
     Compare(CompareArgs),
-    /// Tell what a scene or an image holds.
+    /// Tell what a scene, a volume file or an image holds.
     Info(InfoArgs),
     /// Run the built-in exact benchmarks on this machine.
     Verify(VerifyArgs),
@@ -112,6 +112,9 @@ pub(crate) struct SourceArgs {
     /// Let scene files name files outside their folder.
     #[arg(long)]
     pub(crate) allow_external: bool,
+    /// Most memory that one density grid may take, in GiB; 8 where not given.
+    #[arg(long, value_name = "GIB", value_parser = value::gibibytes, allow_negative_numbers = true)]
+    pub(crate) max_grid_memory: Option<u64>,
 }
 
 #[derive(Args, Debug)]

@@ -3,6 +3,7 @@
 use tyndall_render::error::RenderError;
 use tyndall_render::probe::ProbeError;
 use tyndall_scene::SceneError;
+use tyndall_scene::volume_file::VolumeFileError;
 
 /// Why the command could not do what it was asked.
 #[derive(Debug, thiserror::Error)]
@@ -10,6 +11,9 @@ pub(crate) enum CliError {
     /// A scene could not be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A volume file could not be looked into.
+    #[error(transparent)]
+    Volume(#[from] VolumeFileError),
     /// A render, a comparison or an image file failed.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -36,7 +40,7 @@ pub(crate) enum CliError {
     },
     /// `tyndall info` was given a file of a kind it does not know.
     #[error(
-        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images)"
+        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), in .vdb or .vol (volumes), or in .exr, .png, .hdr or .jpg (images)"
     )]
     UnknownKind {
         /// The file.
@@ -55,6 +59,7 @@ impl CliError {
     pub(crate) fn status(&self) -> u8 {
         match self {
             Self::Scene(_)
+            | Self::Volume(_)
             | Self::Probe(_)
             | Self::UnknownKind { .. }
             | Self::Overwrites { .. } => 2,

@@ -219,17 +219,18 @@ impl Medium {
         self.vacuum
     }
 
-    /// The smallest box around all of it; `None` where it has no bounds.
+    /// A box around all of it, empty where there is nothing; `None` where it has no bounds.
     pub fn bounds(&self) -> Option<Aabb> {
         let of_grid = match self.density() {
             Density::Grid(grid) => grid.bounds(),
             Density::Constant(_) | Density::Height { .. } => None,
         };
         match (self.region().bounds(), of_grid) {
-            (Some(a), Some(b)) => Some(Aabb {
-                min: a.min.max(b.min),
-                max: a.max.min(b.max),
-            }),
+            (Some(a), Some(b)) => {
+                let (min, max) = (a.min.max(b.min), a.max.min(b.max));
+                let meet = min.cmple(max).all();
+                Some(if meet { Aabb { min, max } } else { Aabb::EMPTY })
+            }
             (a, b) => a.or(b),
         }
     }

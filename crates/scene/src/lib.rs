@@ -42,6 +42,7 @@ pub mod camera;
 pub mod error;
 pub mod film;
 pub mod gltf;
+mod grids;
 pub mod hierarchy;
 pub mod lights;
 pub mod load;

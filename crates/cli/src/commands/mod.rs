@@ -35,6 +35,7 @@ impl SourceArgs {
         LoadOptions {
             allow_external: self.allow_external,
             fog: self.fog,
+            max_grid_bytes: self.max_grid_memory,
             ..LoadOptions::default()
         }
     }

@@ -179,9 +179,12 @@ impl Grid {
         }
     }
 
-    /// The smallest box around all that is not zero; `None` where nothing bounds it.
+    /// A box around all that is not zero; `None` where nothing bounds it.
     pub fn bounds(&self) -> Option<Aabb> {
         let domain = self.domain?;
+        if self.max() == 0.0 {
+            return Some(Aabb::EMPTY);
+        }
         let corners = (0..8).map(|corner| {
             let pick = |axis: usize| domain[corner >> axis & 1][axis];
             let index = DVec3::new(pick(0), pick(1), pick(2));
