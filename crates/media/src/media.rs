@@ -5,7 +5,7 @@
 use crate::gradient::{self, EndGradients};
 use crate::hessian;
 use crate::line::Line;
-use crate::segment::Piece;
+use crate::segment::depth;
 use crate::{Edges, Medium, MediumPoint, Region, Segment};
 use glam::{DVec3, Vec3};
 use tyndall_math::{Aabb, Jet, Ray};
@@ -56,8 +56,10 @@ impl Media {
         let line = Line::from(ray);
         let mut tau = Vec3::ZERO;
         for medium in &self.list {
-            if let Some(piece) = Piece::new(medium, &line, t_max.into()) {
-                tau += piece.total();
+            if !medium.is_vacuum()
+                && let Some((t0, t1)) = medium.clip(&line, t_max.into())
+            {
+                tau += depth(medium.sigma_t(), medium.density().column_on(&line, t0, t1));
             }
         }
         tau

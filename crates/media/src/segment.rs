@@ -16,7 +16,7 @@ pub struct Segment<'a> {
 
 /// The stretch of a ray inside one medium.
 #[derive(Clone, Debug)]
-pub(crate) struct Piece<'a> {
+struct Piece<'a> {
     medium: &'a Medium,
     profile: Profile<'a>,
     // f64: a short stretch far along the ray is the small difference of its ends.
@@ -27,14 +27,16 @@ pub(crate) struct Piece<'a> {
 impl<'a> Piece<'a> {
     /// The stretch of `line` up to `t_max` inside `medium`, where there is one that matters to light.
     #[inline]
-    pub(crate) fn new(medium: &'a Medium, line: &Line, t_max: f64) -> Option<Self> {
+    fn new(medium: &'a Medium, line: &Line, t_max: f64) -> Option<Self> {
         if medium.is_vacuum() {
             return None;
         }
         let (t0, t1) = medium.clip(line, t_max)?;
+        let mut profile = medium.density().along(line);
+        profile.prepare(t0, t1);
         Some(Self {
             medium,
-            profile: medium.density().along(line),
+            profile,
             t0,
             t1,
         })
@@ -53,7 +55,7 @@ impl<'a> Piece<'a> {
     }
 
     #[inline]
-    pub(crate) fn total(&self) -> Vec3 {
+    fn total(&self) -> Vec3 {
         depth(self.medium.sigma_t(), self.profile.column(self.t0, self.t1))
     }
 
@@ -108,8 +110,7 @@ impl<'a> Segment<'a> {
         // A loop: `collect` into a `SmallVec` costs some hundred instructions even for one medium.
         let mut pieces = SmallVec::new();
         for medium in media {
-            if let Some(mut piece) = Piece::new(medium, line, t_max.into()) {
-                piece.profile.prepare(piece.t0, piece.t1);
+            if let Some(piece) = Piece::new(medium, line, t_max.into()) {
                 pieces.push(piece);
             }
         }

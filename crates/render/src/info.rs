@@ -3,7 +3,7 @@
 //! Plain data with units in the field names; the command line prints or serialises it.
 
 use crate::image::Image;
-use glam::{IVec3, Vec3};
+use glam::Vec3;
 use serde::Serialize;
 use tyndall_media::grid::Grid;
 use tyndall_media::{Density, Medium, PhaseFunction, Region};
@@ -97,7 +97,7 @@ pub struct MediumInfo {
 /// The grid of a medium's density.
 #[derive(Clone, Debug, Serialize)]
 pub struct MediumGridInfo {
-    /// Edges of the box around voxels that differ from the background, in voxels.
+    /// Edges of the box around all that is not background, in voxels.
     pub size_voxels: [u64; 3],
     /// Largest density.
     pub max_density: f32,
@@ -109,13 +109,8 @@ pub struct MediumGridInfo {
 
 impl MediumGridInfo {
     fn of(grid: &Grid) -> Self {
-        let size = |[low, high]: [IVec3; 2]| {
-            (high.as_i64vec3() - low.as_i64vec3() + 1)
-                .to_array()
-                .map(|n| n.unsigned_abs())
-        };
         Self {
-            size_voxels: grid.voxels().support().map_or([0; 3], size),
+            size_voxels: grid.size(),
             max_density: grid.max(),
             bounds_m: grid
                 .bounds()

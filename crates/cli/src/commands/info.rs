@@ -151,7 +151,7 @@ fn volume_text(volume: &VolumeInfo) -> String {
             voxels.active_voxels
         ));
         lines.push(format!(
-            "    values   min {}  mean {:.6}  max {}  background {}  negative {}",
+            "    values   min {:?}  mean {:.6}  max {:?}  background {:?}  negative {}",
             voxels.min, voxels.mean, voxels.max, voxels.background, voxels.negative_voxels
         ));
         let row = |row: [f64; 4]| row.map(|n| format!("{n:.6}")).join(" ");

@@ -76,7 +76,7 @@ impl Density {
     pub fn column(&self, ray: &Ray, t0: f32, t1: f32) -> f32 {
         let line = ray.into();
         match self.clip(&line, t0.into(), t1.into()) {
-            Some((t0, t1)) => self.along(&line).column(t0, t1) as f32,
+            Some((t0, t1)) => self.column_on(&line, t0, t1) as f32,
             None => 0.0,
         }
     }
@@ -116,6 +116,20 @@ impl Density {
             Self::Constant(density) => *density,
             Self::Height { .. } => 1.0,
             Self::Grid(grid) => grid.max(),
+        }
+    }
+
+    /// ∫ density dt along `line` from `t0` to `t1 ≥ t0`.
+    #[inline]
+    pub(crate) fn column_on(&self, line: &Line, t0: f64, t1: f64) -> f64 {
+        match *self {
+            // Never 0 · ∞.
+            Self::Constant(0.0) => 0.0,
+            Self::Constant(density) => f64::from(density) * (t1 - t0),
+            Self::Height { base, scale_height } => {
+                HeightProfile::new(base, scale_height, line).column(t0, t1)
+            }
+            Self::Grid(ref grid) => GridProfile::new(grid, line).column(t0, t1),
         }
     }
 

@@ -156,10 +156,10 @@ impl<R: Read + Seek> Vol<R> {
         let mut slices = Slices::new(self, channel)?;
         // Eight slices of the padded volume at a time.
         let mut slab: [Vec<f32>; BRICK_SIDE as usize] = Default::default();
-        for z in 0..=last.z {
+        for z in 0..=last.z | 7 {
             slices.advance_to(self, (z - 1).clamp(0, self.size.z - 1))?;
             slab[(z & 7) as usize].clone_from(&slices.current);
-            if z & 7 == 7 || z == last.z {
+            if z & 7 == 7 {
                 self.bricks(&slab, z, &mut builder);
             }
         }
@@ -185,7 +185,7 @@ impl<R: Read + Seek> Vol<R> {
         })
     }
 
-    /// Adds the bricks whose last slice is `z`.
+    /// Adds the bricks whose last slice is `z`. Copies go on to the ends of bricks, so that those of constant volumes become tiles.
     fn bricks(&self, slab: &[Vec<f32>; 8], z: i32, builder: &mut VoxelsBuilder) {
         let last = self.size + 1;
         for bx in 0..=last.x >> 3 {
@@ -194,9 +194,6 @@ impl<R: Read + Seek> Vol<R> {
                 let brick: Brick = std::array::from_fn(|i| {
                     let i = i as i32;
                     let voxel = min + (IVec3::new(i >> 6, i >> 3, i) & 7);
-                    if voxel.cmpgt(last).any() {
-                        return 0.0;
-                    }
                     let from = (voxel - 1).clamp(IVec3::ZERO, self.size - 1);
                     let values = &slab[(voxel.z & 7) as usize];
                     let place = from.y as usize * self.size.x as usize + from.x as usize;

@@ -62,6 +62,20 @@ fn cells_are_stored_one_farther_with_copies_around() {
 }
 
 #[test]
+fn a_constant_volume_takes_no_bricks() {
+    let mut bytes = header(1, [50, 9, 33, 1], BOUNDS);
+    bytes.extend([0.5_f32; 50 * 9 * 33].map(f32::to_le_bytes).concat());
+    let volume = read(bytes, None).unwrap();
+    // Two nodes of 4 KiB and a table instead of 290 KiB.
+    assert!(
+        volume.built.voxels.bytes() < 16_000,
+        "{}",
+        volume.built.voxels.bytes()
+    );
+    assert_eq!(volume.built.voxels.max(), 0.5);
+}
+
+#[test]
 fn halves_bytes_and_channels_are_read() {
     let mut halves = header(2, [2, 1, 1, 1], BOUNDS);
     halves.extend([0x3c00_u16, 0x4200].map(u16::to_le_bytes).concat());

@@ -139,6 +139,16 @@ impl Grid {
         self.scale
     }
 
+    /// Edges of the box in which voxels differ from the background, or of that outside of which there is nothing, in voxels.
+    pub fn size(&self) -> [u64; 3] {
+        let size = match (self.edge, self.voxels.support()) {
+            (GridEdge::Box([low, high]), _) => (high - low).round().as_i64vec3(),
+            (GridEdge::Background, Some([low, high])) => high.as_i64vec3() - low.as_i64vec3() + 1,
+            (GridEdge::Background, None) => return [0; 3],
+        };
+        size.to_array().map(i64::unsigned_abs)
+    }
+
     /// The largest density anywhere.
     pub fn max(&self) -> f32 {
         self.voxels.max() * self.scale

@@ -71,9 +71,29 @@ fn corners_in(brick: &[f32; 512], first: usize) -> [f32; 8] {
     [0, 64, 8, 72, 1, 65, 9, 73].map(|offset| brick[(first + offset) & 511])
 }
 
-/// The same for cells between bricks.
+/// The same for cells between blocks: two to eight of these, each looked up once.
 fn corners_across(voxels: &Voxels, cell: IVec3) -> [f32; 8] {
-    [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| voxels.value(cell + offset(corner)))
+    // The axes on which the cell lies between blocks of 8³.
+    let across = (cell & (BRICK_SIDE - 1)).cmpeq(IVec3::splat(BRICK_SIDE - 1));
+    let across = across.bitmask() as i32;
+    let mut corners = [0.0; 8];
+    let mut side = 0;
+    loop {
+        let block = voxels.block(cell + offset(side));
+        for (corner, value) in (0..).zip(&mut corners) {
+            if corner & across == side {
+                *value = match block {
+                    Block::Tile { value, .. } => value,
+                    Block::Brick(brick) => brick[in_brick(cell + offset(corner))],
+                };
+            }
+        }
+        if side == across {
+            return corners;
+        }
+        // The next subset of the axes.
+        side = (side - across) & across;
+    }
 }
 
 /// The offset of a corner from the first.
