@@ -27,7 +27,7 @@ pub(crate) enum Command {
     Probe(ProbeArgs),
     /// Tell how far an image is from a reference.
     Compare(CompareArgs),
-    /// Tell what a scene, an image or a cache file holds.
+    /// Tell what a scene, a volume file, an image or a cache file holds.
     Info(InfoArgs),
     /// Run the built-in exact benchmarks on this machine.
     Verify(VerifyArgs),
@@ -120,6 +120,9 @@ pub(crate) struct SourceArgs {
     /// Let scene files name files outside their folder.
     #[arg(long)]
     pub(crate) allow_external: bool,
+    /// Most memory that one density grid may take, in GiB; 8 where not given.
+    #[arg(long, value_name = "GIB", value_parser = value::gibibytes, allow_negative_numbers = true)]
+    pub(crate) max_grid_memory: Option<u64>,
 }
 
 #[derive(Args, Debug)]

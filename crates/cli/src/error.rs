@@ -2,6 +2,7 @@
 
 use tyndall_render::error::RenderError;
 use tyndall_render::probe::ProbeError;
+use tyndall_scene::volume_file::VolumeFileError;
 use tyndall_scene::{FrameError, SceneError};
 
 /// Why the command could not do what it was asked.
@@ -10,6 +11,9 @@ pub(crate) enum CliError {
     /// A scene could not be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A volume file could not be looked into.
+    #[error(transparent)]
+    Volume(#[from] VolumeFileError),
     /// A render, a comparison or an image file failed.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -47,7 +51,7 @@ pub(crate) enum CliError {
     },
     /// `tyndall info` was given a file of a kind it does not know.
     #[error(
-        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), or in .exr, .png, .hdr or .jpg (images), unless it is a cache file"
+        "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), in .vdb or .vol (volumes), or in .exr, .png, .hdr or .jpg (images), unless it is a cache file"
     )]
     UnknownKind {
         /// The file.
@@ -67,6 +71,7 @@ impl CliError {
         match self {
             Self::Scene(_)
             | Self::Frame(_)
+            | Self::Volume(_)
             | Self::Probe(_)
             | Self::OneFileForFrames { .. }
             | Self::UnknownKind { .. }

@@ -15,6 +15,14 @@ pub(crate) fn vector(text: &str) -> Result<[f32; 3], String> {
     <[f32; 3]>::try_from(numbers(text)?).map_err(|_| "three numbers X,Y,Z are wanted".to_owned())
 }
 
+/// A size in GiB, as bytes.
+pub(crate) fn gibibytes(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(size) if size > 0.0 && size.is_finite() => Ok((size * f64::from(1 << 30)) as u64),
+        _ => Err("a size in GiB above 0 is wanted".to_owned()),
+    }
+}
+
 /// Fog as `SIGMA_T[,ALBEDO[,G]]`.
 pub(crate) fn fog(text: &str) -> Result<Fog, String> {
     let numbers = numbers(text)?;

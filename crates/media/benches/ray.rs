@@ -6,9 +6,11 @@
 )]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use glam::Vec3;
+use glam::{DAffine3, DVec3, IVec3, Vec3};
 use std::hint::black_box;
+use std::sync::Arc;
 use tyndall_math::Ray;
+use tyndall_media::grid::{Grid, GridEdge, VoxelsBuilder};
 use tyndall_media::{Density, Media, Medium, MediumParams, PhaseFunction, Region};
 
 fn media(params: Vec<MediumParams>) -> Media {
@@ -20,7 +22,31 @@ fn media(params: Vec<MediumParams>) -> Media {
     )
 }
 
+/// 96³ voxels of different values in a cube of 4 m.
+fn noise() -> Option<Density> {
+    let mut builder =
+        VoxelsBuilder::new(0.0, [IVec3::ZERO, IVec3::splat(95)], 1728, 1 << 30).ok()?;
+    for x in 0..12 {
+        for y in 0..12 {
+            for z in 0..12 {
+                let brick = std::array::from_fn(|i| (i * 31 % 7) as f32);
+                builder.set_brick(IVec3::new(x, y, z) * 8, &brick);
+            }
+        }
+    }
+    let voxels = Arc::new(builder.finish().ok()?.voxels);
+    let map = DAffine3 {
+        translation: DVec3::splat(-2.0),
+        ..DAffine3::from_scale(DVec3::splat(4.0 / 96.0))
+    };
+    let grid = Grid::new(voxels, map, 0.1, GridEdge::Background).ok()?;
+    Some(Density::Grid(Arc::new(grid)))
+}
+
 fn rays(c: &mut Criterion) {
+    let Some(density) = noise() else {
+        return;
+    };
     let fog = MediumParams::new(Vec3::splat(0.2), Vec3::splat(0.9));
     let boxed = MediumParams {
         region: Region::Box {
@@ -36,7 +62,12 @@ fn rays(c: &mut Criterion) {
         },
         ..fog.clone()
     };
+    let smoke = MediumParams {
+        density,
+        ..fog.clone()
+    };
     let scenes = [
+        ("grid", media(vec![smoke])),
         ("everywhere", media(vec![fog.clone()])),
         ("box", media(vec![boxed.clone()])),
         ("height", media(vec![height.clone()])),

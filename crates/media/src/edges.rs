@@ -6,7 +6,7 @@
 
 use crate::gradient::GRAZING;
 use crate::line::Line;
-use crate::{Medium, Region};
+use crate::{Density, Medium, Region};
 use glam::{DMat3, DVec3};
 
 /// The edges of all boxes of medium, as seen from one point.
@@ -90,11 +90,8 @@ impl<'a> Edges<'a> {
         let d = edge.across.length();
         let direction = edge.across / d * cos + edge.along * sin;
         let distance = d / cos;
-        let line = Line {
-            origin: self.x,
-            direction,
-        };
-        let density = edge.medium.density().along(&line).value(distance);
+        let p = self.x + direction * distance;
+        let density = edge.medium.density().jet(p).value;
         let over_pdf = self.total / edge.weight * (end - begin);
         let sigma_t = edge.medium.sigma_t().as_dvec3() * (density * over_pdf);
         Some(EdgePoint {
@@ -131,13 +128,18 @@ impl<'a> Edge<'a> {
         let [a1, a2] = [d1, d2].map(|a| a.abs().max(GRAZING * d).copysign(a));
         let m = d2 * n1 - d1 * n2;
         let angles = corners.map(|corner| corner[axis].atan2(d));
-        // Of a fog the density of the lower end, the larger.
-        let lower = Line {
-            origin: x + across,
-            direction: corners[0][axis] * DVec3::AXES[axis],
+        let densest = match medium.density() {
+            Density::Grid(grid) => grid.max().into(),
+            // Of a fog the density of the lower end, the larger.
+            density @ (Density::Constant(_) | Density::Height { .. }) => {
+                let lower = Line {
+                    origin: x + across,
+                    direction: corners[0][axis] * DVec3::AXES[axis],
+                };
+                density.along(&lower).value(1.0)
+            }
         };
-        let extinction =
-            f64::from(medium.sigma_t().element_sum()) * medium.density().along(&lower).value(1.0);
+        let extinction = f64::from(medium.sigma_t().element_sum()) * densest;
         let weight = extinction * (d / (a1 * a2)).abs() * (angles[1] - angles[0]);
         (weight > 0.0).then(|| Self {
             medium,

@@ -1,7 +1,7 @@
 //! How optical depth changes when the ends of its segment move.
 //!
 //! Moving an end shears the segment: it meets denser or thinner medium (∇ρ), its own end gains or loses length, and the
-//! points where it enters and leaves regions slide along it. All three are in closed form here.
+//! points where it enters and leaves regions slide along it. All three are exact here.
 
 use crate::Medium;
 use crate::line::Line;
@@ -58,8 +58,7 @@ impl ColumnGradient {
 
     /// The column of `medium` along `line` from 0 to `length`, which may be infinite.
     fn new(medium: &Medium, line: &Line, length: f64) -> Self {
-        let region = medium.region();
-        let Some((t0, t1)) = region.clip_line(line, length) else {
+        let Some((t0, t1)) = medium.clip(line, length) else {
             return Self::flat(0.0);
         };
         let profile = medium.density().along(line);
@@ -71,7 +70,7 @@ impl ColumnGradient {
         let across = |v: DVec3| v - n * n.dot(v);
         // Per metre of sideways motion at the crossing it slides by −N⊥/(N·n) along the ray; N is the outward normal.
         let slide = |t: f64| {
-            let normal = region.normal(line.at(t));
+            let (normal, _) = medium.boundary(line.at(t));
             let cosine = normal.dot(n);
             across(normal) * (-profile.value(t) / cosine.abs().max(GRAZING).copysign(cosine))
         };

@@ -1,13 +1,13 @@
-//! How optical depth and its gradient change when an end of its segment moves: second derivatives, in closed form.
+//! How optical depth and its gradient change when an end of its segment moves: second derivatives, exact.
 //!
 //! A moving point tilts or shifts the line, and slides its ends and its crossings of boundaries along it. With these
 //! motions as jets, the column is expanded to second order in them.
 
+use crate::Medium;
 use crate::density::Profile;
 use crate::gradient::{GRAZING, OPAQUE};
 use crate::line::Line;
-use crate::{Medium, Region};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use tyndall_math::{Jet, JetVec3};
 
 /// A stretch of a line that moves with a point, to second order in the motion of that point.
@@ -73,10 +73,9 @@ impl MovingLine {
     /// The column of `medium` along the stretch.
     ///
     /// With the line moved by u + t v, C = ∫ ρ dt + ∫ ∇ρ · (u + t v) dt + ½ ∫ (u + t v)ᵀ Hρ (u + t v) dt, between ends that
-    /// slide. Densities vary with height alone: only the vertical parts of u and v count.
+    /// slide.
     fn column(&self, medium: &Medium) -> Jet {
-        let region = medium.region();
-        let Some((t0, t1)) = region.clip_line(&self.line, self.end.value) else {
+        let Some((t0, t1)) = medium.clip(&self.line, self.end.value) else {
             return Jet::ZERO;
         };
         let profile = medium.density().along(&self.line);
@@ -85,53 +84,68 @@ impl MovingLine {
             return column.into();
         }
         let start = if t0 > 0.0 {
-            self.crossing(region, t0)
+            self.crossing(medium, t0)
         } else {
             self.start
         };
         let end = if t1 < self.end.value {
-            self.crossing(region, t1)
+            self.crossing(medium, t1)
         } else {
             self.end
         };
-        let (u, v) = (self.origin.y, self.direction.y);
-        let [g0, g1] = profile.gradient_moments(t0, t1).map(|moment| moment.y);
+        self.varied(&profile, t0, t1) + column + self.gained(&profile, end)
+            - self.gained(&profile, start)
+    }
+
+    /// What the column gains between ends that stay, because the line moves to where the density is another.
+    fn varied(&self, profile: &Profile<'_>, t0: f64, t1: f64) -> Jet {
+        let (u, v) = (self.origin, self.direction);
+        if let Profile::Constant(_) = profile {
+            return Jet::ZERO;
+        }
+        let [g0, g1] = profile.gradient_moments(t0, t1);
         let [h0, h1, h2] = profile.hessian_moments(t0, t1);
-        let first = u * g0 + v * g1;
-        let second = u * u * (0.5 * h0) + u * v * h1 + v * v * (0.5 * h2);
-        first + second + column + self.gained(&profile, end) - self.gained(&profile, start)
+        u.dot_fixed(g0)
+            + v.dot_fixed(g1)
+            + (product(u, h0, u) + product(v, h2, v)) * 0.5
+            + product(u, h1, v)
     }
 
     /// What the column gains where its end at rest slides on to `end`, δ farther: δ (ρ + ∇ρ · (u + t v + ½ δ d)), the
     /// density half way.
-    fn gained(&self, profile: &Profile, end: Jet) -> Jet {
+    fn gained(&self, profile: &Profile<'_>, end: Jet) -> Jet {
         let t = end.value;
         if t.is_infinite() {
             // A finite column has no density left there.
             return Jet::ZERO;
         }
         let slide = end - t;
-        let half_way = self.displacement(t).y + slide * (0.5 * self.line.direction.y);
-        slide * (half_way * profile.vertical_gradient(t) + profile.value(t))
+        let half_way = self.displacement(t) + slide * (0.5 * self.line.direction);
+        slide * (half_way.dot_fixed(profile.gradient(t)) + profile.value(t))
     }
 
-    /// The distance near `t` at which the moved line crosses the boundary of `region`.
+    /// The distance near `t` at which the moved line crosses the boundary of `medium`.
     ///
     /// A point that has moved by m from the boundary lies on it where N · m + ½ κ m · m = 0, N being the outward normal
     /// and κ the curvature. With m = u + t v + δ d this is solved for δ by Newton's method from δ = 0, whose two steps
     /// give the first and the second derivatives, with N · d kept above [`GRAZING`] in both.
-    fn crossing(&self, region: &Region, t: f64) -> Jet {
+    fn crossing(&self, medium: &Medium, t: f64) -> Jet {
         let d = self.line.direction;
-        let normal = region.normal(self.line.at(t));
+        let (normal, curvature) = medium.boundary(self.line.at(t));
         let cosine = normal.dot(d);
         let cosine = cosine.abs().max(GRAZING).copysign(cosine);
         let moved = self.displacement(t);
         let slide = moved.dot_fixed(normal) * (-1.0 / cosine);
         let moved = moved + slide * d;
-        let excess = slide * self.direction.dot_fixed(normal)
-            + moved.dot(moved) * (0.5 * region.curvature());
+        let excess =
+            slide * self.direction.dot_fixed(normal) + moved.dot(moved) * (0.5 * curvature);
         slide - excess * (1.0 / cosine) + t
     }
+}
+
+/// aᵀ M b, for a symmetric matrix that stays.
+fn product(a: JetVec3, m: DMat3, b: JetVec3) -> Jet {
+    a.x * b.dot_fixed(m.x_axis) + a.y * b.dot_fixed(m.y_axis) + a.z * b.dot_fixed(m.z_axis)
 }
 
 /// [`Media::optical_depth_jet`](crate::Media::optical_depth_jet) of a list of media.

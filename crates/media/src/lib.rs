@@ -61,7 +61,7 @@ mod point;
 mod region;
 mod segment;
 
-pub use density::Density;
+pub use density::{Density, grid};
 pub use edges::{EdgePoint, Edges};
 pub use gradient::EndGradients;
 pub use march::{ExtinctionField, MovingSegment, SmoothExtinctionField};

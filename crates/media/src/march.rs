@@ -1,6 +1,6 @@
 //! Optical depth through any extinction field, by marching, with the derivatives of what was marched.
 //!
-//! For media that have no closed form: grids, noise, sums of blobs. A [`MovingSegment`] says how the segment follows a
+//! For media that have no closed form: noise, sums of blobs. A [`MovingSegment`] says how the segment follows a
 //! moving point, and its sample points and step lengths move with it, so that gradient and Hessian are exactly those of
 //! the marched sum.
 //!

@@ -5,7 +5,7 @@
 use crate::gradient::{self, EndGradients};
 use crate::hessian;
 use crate::line::Line;
-use crate::segment::Piece;
+use crate::segment::depth;
 use crate::{Edges, Medium, MediumPoint, Region, Segment};
 use glam::{DVec3, Vec3};
 use tyndall_math::{Aabb, Jet, Ray};
@@ -50,14 +50,16 @@ impl Media {
 
     /// Optical depth along `ray` from 0 to `t_max`, which may be infinite, for each channel.
     ///
-    /// τ = Σ σt ∫ ρ dt over the media, each in closed form. May be infinite, never NaN: a channel without
+    /// τ = Σ σt ∫ ρ dt over the media, each exact. May be infinite, never NaN: a channel without
     /// extinction is 0 over any distance. Transmittance is exp(−τ).
     pub fn optical_depth(&self, ray: &Ray, t_max: f32) -> Vec3 {
         let line = Line::from(ray);
         let mut tau = Vec3::ZERO;
         for medium in &self.list {
-            if let Some(piece) = Piece::new(medium, &line, t_max.into()) {
-                tau += piece.total();
+            if !medium.is_vacuum()
+                && let Some((t0, t1)) = medium.clip(&line, t_max.into())
+            {
+                tau += depth(medium.sigma_t(), medium.density().column_on(&line, t0, t1));
             }
         }
         tau
@@ -86,8 +88,9 @@ impl Media {
     ///
     /// Exact and in f64, for formulas that go on with [`Jet`]s. Zero where the points coincide to f32; elsewhere as
     /// [`Media::optical_depth_gradient`], and constant where a column is infinite or above 10²⁰ m. The Hessian has the
-    /// motion and the curvature of region boundaries and the kink of a height fog at its base; where the line grazes
-    /// those within a milliradian, it is bounded instead of exact. On the base all derivatives are those from above.
+    /// motion and the curvature of region boundaries and the kinks of a height fog at its base and of a grid on the faces
+    /// of its cells; where the line grazes those within a milliradian, it is bounded instead of exact. On the base all
+    /// derivatives are those from above.
     pub fn optical_depth_jet(&self, fixed: DVec3, moving: DVec3) -> [Jet; 3] {
         hessian::of_end(&self.list, fixed, moving)
     }
@@ -106,7 +109,7 @@ impl Media {
     }
 
     /// The edges of all boxes of medium, as seen from `x`: where an integral over directions finds second derivatives that
-    /// [`Media::optical_depth_jet`] does not have.
+    /// [`Media::optical_depth_jet`] does not have. Those of the boxes around grids are not among them.
     pub fn edges(&self, x: Vec3) -> Edges<'_> {
         Edges::new(self.matter(), x.as_dvec3())
     }
@@ -134,14 +137,14 @@ impl Media {
     /// Distance in metres from `p` to the nearest point where a medium begins or ends; infinite where none does.
     pub fn distance_to_boundary(&self, p: Vec3) -> f32 {
         self.matter()
-            .map(|m| m.region().distance_to_boundary(p))
+            .map(|m| m.distance_to_boundary(p))
             .fold(f32::INFINITY, f32::min)
     }
 
     /// The smallest box around all media, [`Aabb::EMPTY`] where there are none; `None` where a medium has no bounds.
     pub fn bounds(&self) -> Option<Aabb> {
         self.matter()
-            .try_fold(Aabb::EMPTY, |all, m| Some(all.union(m.region().bounds()?)))
+            .try_fold(Aabb::EMPTY, |all, m| Some(all.union(m.bounds()?)))
     }
 
     /// The media that light notices.

@@ -2,9 +2,11 @@
 //!
 //! [`MediumParams`] is what a user writes; [`Medium::new`] checks it, after which no wrong value can exist.
 
+use crate::line::Line;
 use crate::{Density, PhaseFunction, Region};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
+use tyndall_math::Aabb;
 
 /// Largest extinction coefficient, per metre: a mean free path of a nanometre, far under the wavelength of light, below
 /// which radiative transfer means nothing and f32 distances vanish.
@@ -217,6 +219,51 @@ impl Medium {
         self.vacuum
     }
 
+    /// A box around all of it, empty where there is nothing; `None` where it has no bounds.
+    pub fn bounds(&self) -> Option<Aabb> {
+        let of_grid = match self.density() {
+            Density::Grid(grid) => grid.bounds(),
+            Density::Constant(_) | Density::Height { .. } => None,
+        };
+        match (self.region().bounds(), of_grid) {
+            (Some(a), Some(b)) => {
+                let (min, max) = (a.min.max(b.min), a.max.min(b.max));
+                let meet = min.cmple(max).all();
+                Some(if meet { Aabb { min, max } } else { Aabb::EMPTY })
+            }
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// Distance in metres from `p` to the nearest point where the medium begins or ends abruptly; infinite where it nowhere does. From
+    /// outside the box of a grid, a lower bound of it.
+    pub fn distance_to_boundary(&self, p: Vec3) -> f32 {
+        let of_region = self.region().distance_to_boundary(p);
+        match self.density() {
+            Density::Grid(grid) => of_region.min(grid.distance_to_jump(p)),
+            Density::Constant(_) | Density::Height { .. } => of_region,
+        }
+    }
+
+    /// The distances at which `line` enters and leaves the medium, cut to [0, `t_max`]; `None` where no length is left.
+    #[inline]
+    pub(crate) fn clip(&self, line: &Line, t_max: f64) -> Option<(f64, f64)> {
+        let (t0, t1) = self.region().clip_line(line, t_max)?;
+        self.density().clip(line, t0, t1)
+    }
+
+    /// The boundary near a point of it: its outward unit normal, and how fast that turns along it, in radians per metre.
+    pub(crate) fn boundary(&self, p: DVec3) -> (DVec3, f64) {
+        let region = self.region();
+        if let Density::Grid(grid) = self.density()
+            && let Some((distance, normal)) = grid.nearest_face(p)
+            && distance <= region.distance_to_boundary(p.as_vec3()).into()
+        {
+            return (normal, 0.0);
+        }
+        (region.normal(p), region.curvature())
+    }
+
     /// Scattering per metre at density 1, averaged over the channels: the weight of this medium among others.
     pub(crate) fn mean_sigma_s(&self) -> f32 {
         self.mean_sigma_s
@@ -270,7 +317,7 @@ fn check_density(params: &MediumParams) -> Result<f32, MediumError> {
                 scale_height,
             })
         }
-        Density::Height { .. } => Ok(1.0),
+        Density::Height { .. } | Density::Grid(_) => Ok(params.density.max()),
     }
 }
 

@@ -120,7 +120,7 @@ impl Region {
 
 /// Kay and Kajiya 1986 (slabs), with directions parallel to a slab decided by the origin instead of by 0/0.
 #[inline]
-fn clip_box(line: &Line, min: DVec3, max: DVec3) -> Option<(f64, f64)> {
+pub(crate) fn clip_box(line: &Line, min: DVec3, max: DVec3) -> Option<(f64, f64)> {
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
         let (o, d) = (line.origin[axis], line.direction[axis]);

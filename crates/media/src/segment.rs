@@ -1,6 +1,6 @@
 //! A ray through the media: optical depth as a function of distance, and back.
 //!
-//! The media met are found once; what is asked of the ray afterwards costs a closed form for each of them.
+//! The media met are found once; what is asked of the ray afterwards costs a closed form for each of them, or a few cells of a grid.
 
 use crate::Medium;
 use crate::density::Profile;
@@ -15,10 +15,10 @@ pub struct Segment<'a> {
 }
 
 /// The stretch of a ray inside one medium.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Piece<'a> {
+#[derive(Clone, Debug)]
+struct Piece<'a> {
     medium: &'a Medium,
-    profile: Profile,
+    profile: Profile<'a>,
     // f64: a short stretch far along the ray is the small difference of its ends.
     t0: f64,
     t1: f64,
@@ -27,14 +27,16 @@ pub(crate) struct Piece<'a> {
 impl<'a> Piece<'a> {
     /// The stretch of `line` up to `t_max` inside `medium`, where there is one that matters to light.
     #[inline]
-    pub(crate) fn new(medium: &'a Medium, line: &Line, t_max: f64) -> Option<Self> {
+    fn new(medium: &'a Medium, line: &Line, t_max: f64) -> Option<Self> {
         if medium.is_vacuum() {
             return None;
         }
-        let (t0, t1) = medium.region().clip_line(line, t_max)?;
+        let (t0, t1) = medium.clip(line, t_max)?;
+        let mut profile = medium.density().along(line);
+        profile.prepare(t0, t1);
         Some(Self {
             medium,
-            profile: medium.density().along(line),
+            profile,
             t0,
             t1,
         })
@@ -53,7 +55,7 @@ impl<'a> Piece<'a> {
     }
 
     #[inline]
-    pub(crate) fn total(&self) -> Vec3 {
+    fn total(&self) -> Vec3 {
         depth(self.medium.sigma_t(), self.profile.column(self.t0, self.t1))
     }
 
@@ -162,7 +164,7 @@ impl<'a> Segment<'a> {
     /// [`Segment::optical_depth`]. `None` where the whole segment holds less.
     ///
     /// Never inside a gap or before the first medium of that channel: depth 0 is reached where the medium begins.
-    /// Closed form for one medium and for constant densities, Newton's method otherwise.
+    /// Closed form for one medium and for constant densities, Newton's method otherwise and in the cell of a grid.
     pub fn distance_at(&self, channel: usize, tau: f32) -> Option<f32> {
         let tau = f64::from(tau);
         let t = if let [piece] = self.pieces.as_slice() {

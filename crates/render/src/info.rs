@@ -1,12 +1,14 @@
-//! What a scene or an image holds, as numbers for `tyndall info`.
+//! What a scene, a volume file or an image holds, as numbers for `tyndall info`.
 //!
 //! Plain data with units in the field names; the command line prints or serialises it.
 
 use crate::image::Image;
 use glam::Vec3;
 use serde::Serialize;
+use tyndall_media::grid::Grid;
 use tyndall_media::{Density, Medium, PhaseFunction, Region};
 use tyndall_scene::lights::{FlatEmitter, Light};
+use tyndall_scene::volume_file::{GridSummary, VoxelSummary};
 use tyndall_scene::{CameraMotion, Scene};
 
 /// What a scene holds.
@@ -87,6 +89,8 @@ pub struct MediumInfo {
     pub region: String,
     /// How its density varies, as the scene file writes it.
     pub density: String,
+    /// The grid of its density; null where that is none.
+    pub grid: Option<MediumGridInfo>,
     /// Its phase function, as the scene file writes it.
     pub phase: String,
     /// Extinction at density 1, 1/m per channel.
@@ -99,6 +103,126 @@ pub struct MediumInfo {
     pub mean_free_path_m: [Option<f32>; 3],
     /// Emission at density 1, W/(m³ sr) per channel.
     pub emission_w_m3_sr: [f32; 3],
+}
+
+/// The grid of a medium's density.
+#[derive(Clone, Debug, Serialize)]
+pub struct MediumGridInfo {
+    /// Edges of the box around all that is not background, in voxels.
+    pub size_voxels: [u64; 3],
+    /// Largest density.
+    pub max_density: f32,
+    /// Smallest and largest coordinates of all that is not zero, m; null where it has no bounds.
+    pub bounds_m: Option<[[f32; 3]; 2]>,
+    /// Memory of its voxels, MiB; media may share them.
+    pub memory_mib: f64,
+}
+
+impl MediumGridInfo {
+    fn of(grid: &Grid) -> Self {
+        Self {
+            size_voxels: grid.size(),
+            max_density: grid.max(),
+            bounds_m: grid
+                .bounds()
+                .filter(|bounds| !bounds.is_empty())
+                .map(|bounds| [bounds.min.to_array(), bounds.max.to_array()]),
+            memory_mib: grid.voxels().bytes() as f64 / f64::from(1 << 20),
+        }
+    }
+}
+
+/// What a volume file holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct VolumeInfo {
+    /// Its grids.
+    pub grids: Vec<GridInfo>,
+}
+
+/// One grid of a volume file.
+#[derive(Clone, Debug, Serialize)]
+pub struct GridInfo {
+    /// Its name.
+    pub name: String,
+    /// The type of its values.
+    pub value_type: String,
+    /// What it is for, in the words of the file.
+    pub class: String,
+    /// Its voxels; left out where they cannot be read as a density.
+    #[serde(flatten)]
+    pub voxels: Option<VoxelInfo>,
+    /// Why they cannot be read; null where they can.
+    pub problem: Option<String>,
+}
+
+/// The voxels of a grid.
+#[derive(Clone, Debug, Serialize)]
+pub struct VoxelInfo {
+    /// Edges of the box around active voxels, in voxels.
+    pub size_voxels: [u64; 3],
+    /// Smallest index coordinates of active voxels.
+    pub first_voxel: [i32; 3],
+    /// Number of active voxels.
+    pub active_voxels: u64,
+    /// Smallest value of active voxels.
+    pub min: f32,
+    /// Mean value of active voxels.
+    pub mean: f64,
+    /// Largest value of active voxels.
+    pub max: f32,
+    /// Value of all that is not stored.
+    pub background: f32,
+    /// Number of negative voxels, which a density takes as 0.
+    pub negative_voxels: u64,
+    /// Edges of a voxel, m.
+    pub voxel_edges_m: [f64; 3],
+    /// The first three rows of the matrix that takes index coordinates to metres.
+    pub world_from_index: [[f64; 4]; 3],
+    /// Memory taken, MiB.
+    pub memory_mib: f64,
+}
+
+impl VolumeInfo {
+    /// Describes the grids of a file.
+    pub fn of(grids: &[GridSummary]) -> Self {
+        Self {
+            grids: grids.iter().map(GridInfo::of).collect(),
+        }
+    }
+}
+
+impl GridInfo {
+    fn of(grid: &GridSummary) -> Self {
+        Self {
+            name: grid.name.clone(),
+            value_type: grid.value_type.clone(),
+            class: grid.class.clone(),
+            voxels: grid.voxels.as_ref().ok().map(VoxelInfo::of),
+            problem: grid.voxels.as_ref().err().map(ToString::to_string),
+        }
+    }
+}
+
+impl VoxelInfo {
+    fn of(voxels: &VoxelSummary) -> Self {
+        let (m, t) = (
+            voxels.world_from_index.matrix3,
+            voxels.world_from_index.translation,
+        );
+        Self {
+            size_voxels: voxels.size,
+            first_voxel: voxels.first,
+            active_voxels: voxels.active,
+            min: voxels.min,
+            mean: voxels.mean,
+            max: voxels.max,
+            background: voxels.background,
+            negative_voxels: voxels.negative,
+            voxel_edges_m: [m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.length()),
+            world_from_index: [0, 1, 2].map(|i| m.row(i).extend(t[i]).to_array()),
+            memory_mib: voxels.bytes as f64 / f64::from(1 << 20),
+        }
+    }
 }
 
 impl SceneInfo {
@@ -218,10 +342,7 @@ impl LightInfo {
 
 impl MediumInfo {
     fn of(medium: &Medium) -> Self {
-        let densest = match medium.density() {
-            Density::Constant(density) => *density,
-            Density::Height { .. } => 1.0,
-        };
+        let densest = medium.density().max();
         let free_path =
             |sigma_t: f32| Some(1.0 / (sigma_t * densest)).filter(|path| path.is_finite());
         Self {
@@ -240,6 +361,11 @@ impl MediumInfo {
                 Density::Height { base, scale_height } => {
                     format!("Height(base: {base:?}, scale_height: {scale_height:?})")
                 }
+                Density::Grid(grid) => format!("Grid(scale: {:?})", grid.scale()),
+            },
+            grid: match medium.density() {
+                Density::Grid(grid) => Some(MediumGridInfo::of(grid)),
+                Density::Constant(_) | Density::Height { .. } => None,
             },
             phase: written(medium.phase()),
             sigma_t_per_m: medium.sigma_t().to_array(),

@@ -7,6 +7,7 @@ use crate::digest;
 use crate::error::{SceneError, Warning};
 use crate::film::FilmSize;
 use crate::gltf::{self, AnimatedCamera, GltfCamera, GltfScene, PunctualLight};
+use crate::grids::GridFiles;
 use crate::lights::{EnvironmentLight, Light, LightSet, SkyLight, read_environment};
 use crate::load::{Fog, LoadOptions};
 use crate::motion::CameraMotion;
@@ -18,7 +19,7 @@ use glam::Vec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tyndall_math::{Aabb, Ray};
-use tyndall_media::{Media, Medium, MediumParams, PhaseFunction, Region};
+use tyndall_media::{Density, Media, Medium, MediumParams, PhaseFunction, Region};
 
 /// A scene being put together.
 pub(crate) struct Assembly<'a> {
@@ -52,7 +53,7 @@ impl Assembly<'_> {
         });
         let (lights, light_of_triangle) = LightSet::new(lights, &surfaces);
         let geometry = Triangles::new(surfaces, light_of_triangle);
-        let bounded = media.iter().filter_map(|medium| medium.region().bounds());
+        let bounded = media.iter().filter_map(Medium::bounds);
         let mut bounds = bounded.fold(geometry.bounds(), Aabb::union);
         if let Some(fog) = &self.options.fog {
             let fog = self.fog_in(&bounds, fog)?;
@@ -182,17 +183,43 @@ impl Assembly<'_> {
         }
     }
 
-    fn media(&self, file: &SceneFile) -> Result<Vec<Medium>, SceneError> {
+    fn media(&mut self, file: &SceneFile) -> Result<Vec<Medium>, SceneError> {
+        let mut grids = GridFiles::default();
         let media = file.media.iter().enumerate();
-        media.map(|(i, medium)| self.medium(i, medium)).collect()
+        media
+            .map(|(i, medium)| self.medium(i, medium, &mut grids))
+            .collect()
+    }
+
+    /// The density that the grid at `field` makes.
+    fn grid(
+        &mut self,
+        grid: &scene_file::media::Grid,
+        field: &str,
+        grids: &mut GridFiles,
+    ) -> Result<Density, SceneError> {
+        let (file, _) = self.locate(&grid.file, &format!("{field}.file"))?;
+        let limit = self.options.max_grid_bytes;
+        let (grid, warning) = grids
+            .grid(grid, &file, limit)
+            .map_err(|error| self.wrong_field(field, error))?;
+        if !self.files.contains(&file) {
+            self.files.push(file);
+        }
+        self.warnings.extend(warning);
+        Ok(Density::Grid(Arc::new(grid)))
     }
 
     fn medium(
-        &self,
+        &mut self,
         index: usize,
         medium: &scene_file::media::Medium,
+        grids: &mut GridFiles,
     ) -> Result<Medium, SceneError> {
         let field = format!("media[{index}]");
+        let density = medium
+            .density
+            .placed(|grid| self.grid(grid, &format!("{field}.density"), grids))?;
         let name = medium
             .name
             .clone()
@@ -200,13 +227,7 @@ impl Assembly<'_> {
         let params = MediumParams {
             name,
             region: medium.region.placed(),
-            density: medium.density.placed().ok_or_else(|| {
-                self.unsupported(
-                    "density Grid",
-                    "use Constant or Height",
-                    format!("{field}.density"),
-                )
-            })?,
+            density,
             sigma_t: medium.sigma_t.0,
             albedo: medium.albedo.0,
             phase: medium
@@ -215,7 +236,13 @@ impl Assembly<'_> {
                 .map_err(|error| self.wrong_field(&format!("{field}.phase"), error))?,
             emission: medium.emission.0,
         };
-        Medium::new(params).map_err(|error| self.wrong_field(&field, error))
+        let medium = Medium::new(params).map_err(|error| self.wrong_field(&field, error))?;
+        if medium.bounds().is_some_and(|bounds| bounds.is_empty()) && !medium.is_vacuum() {
+            self.warnings.push(Warning::GridOutsideRegion {
+                medium: medium.name().into(),
+            });
+        }
+        Ok(medium)
     }
 
     /// Homogeneous fog in `bounds` grown by 1 %.
@@ -339,15 +366,6 @@ impl Assembly<'_> {
             problem: problem.to_string(),
             field: field.into(),
             place: self.place_of(field),
-        }
-    }
-
-    fn unsupported(&self, what: &str, mend: &str, field: String) -> SceneError {
-        SceneError::Unsupported {
-            what: what.into(),
-            mend: mend.into(),
-            place: self.place_of(&field),
-            field,
         }
     }
 

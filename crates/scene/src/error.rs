@@ -146,6 +146,26 @@ pub enum Warning {
         count: usize,
     },
 
+    /// Negative values of a volume file.
+    #[error("{count} negative voxels of grid \"{grid}\" became 0 ({})", file.display())]
+    NegativeVoxels {
+        /// Name of the grid.
+        grid: String,
+        /// How many.
+        count: u64,
+        /// The volume file.
+        file: PathBuf,
+    },
+
+    /// A medium's grid and its region have no point in common.
+    #[error(
+        "the grid of medium \"{medium}\" lies outside its region: there is nothing of it; move the region or the grid"
+    )]
+    GridOutsideRegion {
+        /// Name of the medium.
+        medium: String,
+    },
+
     /// A light that sends out nothing.
     #[error("{light} has no power and is ignored")]
     DarkLight {

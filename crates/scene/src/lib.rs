@@ -44,6 +44,7 @@ mod digest;
 pub mod error;
 pub mod film;
 pub mod gltf;
+mod grids;
 mod hermite;
 pub mod hierarchy;
 pub mod lights;
@@ -56,6 +57,7 @@ pub mod scene;
 pub mod scene_file;
 pub mod texture;
 pub mod triangles;
+pub mod volume_file;
 pub mod watertight;
 
 pub use camera::{Camera, CameraError};

@@ -18,6 +18,8 @@ pub struct LoadOptions {
     pub fog: Option<Fog>,
     /// Whether a glTF file may stand alone without fog, as when it is only looked into.
     pub bare_gltf: bool,
+    /// Memory that one density grid may take, in bytes; where left out, [`DEFAULT_MEMORY`](crate::volume_file::DEFAULT_MEMORY).
+    pub max_grid_bytes: Option<u64>,
     /// Pixels from left to right, instead of the scene's.
     pub width: Option<u32>,
     /// Pixels from top to bottom, instead of the scene's.

@@ -99,6 +99,7 @@ impl Scene {
             count("height", |density| {
                 matches!(density, Density::Height { .. })
             }),
+            count("grid", |density| matches!(density, Density::Grid(_))),
         ]
         .into_iter()
         .flatten()

@@ -59,7 +59,6 @@ const SCENES: &[&str] = &[
     "Scene(media: [Medium(sigma_t: (1, 1234567890123456789012345678901234567890, 3), albedo: (0, 0, 0))])",
     "Scene(media: [Medium(sigma_t: (1, 1, 1), albedo: (0, 1.2, 0))])",
     "Scene(media: [Medium(sigma_t: (1, 1, 1), albedo: (0, 1, -0.1))])",
-    "Scene(media: [Medium(sigma_t: (1, 1, 1), albedo: (0, 1, 0)),\n    Medium(sigma_t: (1, 1, 1), albedo: (0, 1, 0), density: Grid(file: \"a.vdb\"))])",
     "Scene(media: [Medium(sigma_t: (1, 1e8, 1), albedo: (0, 1, 0), density: Constant(1e6))])",
     "Scene(camera: LookAt(eye: (0, 0, 1), target: (0, 0, 0), vfov: 180))",
     "Scene(camera: LookAt(eye: (0, 0, 1), target: (0, 0, 0), vfov: 0))",

@@ -1,13 +1,13 @@
-//! `tyndall info`: what a scene, an image or a cache file holds.
+//! `tyndall info`: what a scene, a volume file, an image or a cache file holds.
 
-use super::not_built;
 use crate::args::InfoArgs;
 use crate::error::CliError;
 use crate::output;
 use tyndall_render::CacheInfo;
 use tyndall_render::image_file::read_image;
-use tyndall_render::info::{ImageInfo, LightInfo, SceneInfo};
+use tyndall_render::info::{ImageInfo, LightInfo, SceneInfo, VolumeInfo};
 use tyndall_scene::LoadOptions;
+use tyndall_scene::volume_file::{self, DEFAULT_MEMORY};
 
 /// Lights listed one by one in the text; scenes can have thousands.
 const LIGHTS_SHOWN: usize = 24;
@@ -40,10 +40,15 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
                 output::print(&image_text(&image))
             }
         }
-        "vdb" | "nvdb" | "vol" => Err(not_built(
-            "reading volume files",
-            "describe the fog by Constant or Height density in a scene file",
-        )),
+        "vdb" | "nvdb" | "vol" => {
+            let limit = args.source.max_grid_memory.unwrap_or(DEFAULT_MEMORY);
+            let volume = VolumeInfo::of(&volume_file::inspect(&args.file, limit)?);
+            if args.json {
+                output::print_json(&volume)
+            } else {
+                output::print(&volume_text(&volume))
+            }
+        }
         _ if CacheInfo::is_cache(&args.file) => {
             let cache = CacheInfo::of(&args.file)?;
             if args.json {
@@ -104,6 +109,14 @@ fn scene_text(scene: &SceneInfo) -> String {
             "  {}  in {}, density {}, phase {}",
             medium.name, medium.region, medium.density, medium.phase
         ));
+        if let Some(grid) = &medium.grid {
+            lines.push(format!(
+                "    grid of {} voxels, density up to {}, {:.1} MiB",
+                cells(grid.size_voxels),
+                grid.max_density,
+                grid.memory_mib
+            ));
+        }
         lines.push(format!(
             "    mean free path ({}) m, σt {} /m, albedo {}, emission {} W/(m³ sr)",
             medium.mean_free_path_m.map(path).join(", "),
@@ -134,6 +147,46 @@ fn light_line(light: &LightInfo) -> String {
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     format!("  {}  {}", light.kind, parts.join(", "))
+}
+
+fn volume_text(volume: &VolumeInfo) -> String {
+    let mut lines = vec![format!("grids      {}", volume.grids.len())];
+    for grid in &volume.grids {
+        lines.push(format!(
+            "  {}  {}, {}",
+            grid.name, grid.value_type, grid.class
+        ));
+        if let Some(problem) = &grid.problem {
+            lines.push(format!("    not readable as a density: {problem}"));
+        }
+        let Some(voxels) = &grid.voxels else {
+            continue;
+        };
+        let [x, y, z] = voxels.first_voxel;
+        lines.push(format!(
+            "    size     {} voxels from ({x}, {y}, {z}), {} active",
+            cells(voxels.size_voxels),
+            voxels.active_voxels
+        ));
+        lines.push(format!(
+            "    values   min {:?}  mean {:.6}  max {:?}  background {:?}  negative {}",
+            voxels.min, voxels.mean, voxels.max, voxels.background, voxels.negative_voxels
+        ));
+        let row = |row: [f64; 4]| row.map(|n| format!("{n:.6}")).join(" ");
+        let edges = voxels.voxel_edges_m.map(|n| format!("{n:.6}"));
+        lines.push(format!("    voxels   {} m", edges.join(" × ")));
+        lines.push(format!(
+            "    place    [{}]",
+            voxels.world_from_index.map(row).join("; ")
+        ));
+        lines.push(format!("    memory   {:.1} MiB", voxels.memory_mib));
+    }
+    lines.join("\n")
+}
+
+/// A size in cells.
+fn cells(size: [u64; 3]) -> String {
+    size.map(|n| n.to_string()).join(" × ")
 }
 
 fn image_text(image: &ImageInfo) -> String {

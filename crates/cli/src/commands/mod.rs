@@ -8,7 +8,6 @@ mod verify;
 
 use crate::args::{Command, SourceArgs};
 use crate::error::CliError;
-use tyndall_render::error::RenderError;
 use tyndall_scene::LoadOptions;
 
 /// Does what the command line asks for.
@@ -22,19 +21,12 @@ pub(crate) fn run(command: &Command) -> Result<(), CliError> {
     }
 }
 
-fn not_built(what: &str, instead: &str) -> CliError {
-    RenderError::NotBuilt {
-        what: what.to_owned(),
-        instead: instead.to_owned(),
-    }
-    .into()
-}
-
 impl SourceArgs {
     fn load_options(&self) -> LoadOptions {
         LoadOptions {
             allow_external: self.allow_external,
             fog: self.fog,
+            max_grid_bytes: self.max_grid_memory,
             ..LoadOptions::default()
         }
     }

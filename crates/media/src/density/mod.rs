@@ -1,17 +1,20 @@
 //! How much medium there is at a point: a dimensionless factor on all coefficients of a medium.
 //!
-//! A new kind of density (a grid, say) is a variant of [`Density`] and its restriction to a ray, a variant of [`Profile`]:
+//! A new kind of density is a variant of [`Density`] and its restriction to a ray, a variant of [`Profile`]:
 //! value, column, inverse column and moments of the derivatives. All else follows.
 
+pub mod grid;
 mod height;
 
 use crate::line::Line;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
+use grid::{Grid, GridProfile};
 use height::HeightProfile;
+use std::sync::Arc;
 use tyndall_math::{Jet, Ray};
 
 /// A density field; multiplies a medium's extinction, scattering and emission.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Density {
     /// The same density everywhere; finite and not negative.
     Constant(f32),
@@ -22,6 +25,8 @@ pub enum Density {
         /// Height in metres over which the density falls to 1/e; at least [`MIN_SCALE_HEIGHT`](crate::MIN_SCALE_HEIGHT).
         scale_height: f32,
     },
+    /// From voxels.
+    Grid(Arc<Grid>),
 }
 
 impl Default for Density {
@@ -36,16 +41,19 @@ impl Density {
         match *self {
             Self::Constant(density) => density,
             Self::Height { base, scale_height } => (-((p.y - base) / scale_height).max(0.0)).exp(),
+            Self::Grid(ref grid) => grid.value(p),
         }
     }
 
-    /// The gradient of the density at `p`, per metre; on the kink at a fog's base, that from above.
+    /// The gradient of the density at `p`, per metre; on the kink at a fog's base that from above, on those of a grid that from the side of
+    /// larger coordinates.
     pub fn gradient(&self, p: Vec3) -> Vec3 {
         match *self {
             Self::Height { base, scale_height } if p.y >= base => {
                 Vec3::new(0.0, -self.value(p) / scale_height, 0.0)
             }
             Self::Constant(_) | Self::Height { .. } => Vec3::ZERO,
+            Self::Grid(ref grid) => grid.gradient(p),
         }
     }
 
@@ -58,56 +66,111 @@ impl Density {
             }
             Self::Height { .. } => 1.0.into(),
             Self::Constant(density) => f64::from(density).into(),
+            Self::Grid(ref grid) => grid.jet(p),
         }
     }
 
     /// Density integrated along `ray` from `t0` to `t1 ≥ t0`, in metres; `t1` and the result may be infinite.
     ///
-    /// Closed form, see [`Media::optical_depth`](crate::Media::optical_depth); 0 where the density is 0, however long the ray.
+    /// Exact, see [`Media::optical_depth`](crate::Media::optical_depth); 0 where the density is 0, however long the ray.
     pub fn column(&self, ray: &Ray, t0: f32, t1: f32) -> f32 {
-        self.along(&ray.into()).column(t0.into(), t1.into()) as f32
+        let line = ray.into();
+        match self.clip(&line, t0.into(), t1.into()) {
+            Some((t0, t1)) => self.column_on(&line, t0, t1) as f32,
+            None => 0.0,
+        }
     }
 
     /// The distance t in [`t0`, `t1`] at which the column from `t0` reaches `column`; `None` where all of it is less.
     ///
-    /// The exact inverse of [`Density::column`], in closed form. A column of 0 or less is reached at `t0`.
+    /// The exact inverse of [`Density::column`]. A column of 0 or less is reached at `t0`.
     pub fn invert_column(&self, ray: &Ray, t0: f32, t1: f32, column: f32) -> Option<f32> {
-        let profile = self.along(&ray.into());
-        let t = profile.invert(t0.into(), column.into());
+        let line = ray.into();
+        if column <= 0.0 {
+            return Some(t0);
+        }
+        let (begin, end) = self.clip(&line, t0.into(), t1.into())?;
+        let profile = self.along(&line);
+        let t = profile.invert(begin, column.into());
         if t <= f64::from(t1) {
             // An infinite distance is never reached, not even by an infinite ray.
             return (t <= f64::from(f32::MAX)).then_some(t as f32);
         }
         // The column of the whole way, rounded to f32, may lie above what f64 can reach by half a rounding.
-        (t1.is_finite() && column <= profile.column(t0.into(), t1.into()) as f32).then_some(t1)
+        (t1.is_finite() && column <= profile.column(begin, end) as f32).then_some(t1)
+    }
+
+    /// The part of the stretch from `t0` to `t1` of a line on which there may be more than nothing; `None` where there is none.
+    #[inline]
+    pub(crate) fn clip(&self, line: &Line, t0: f64, t1: f64) -> Option<(f64, f64)> {
+        match self {
+            Self::Grid(grid) => grid.clip(line, t0, t1),
+            Self::Constant(_) | Self::Height { .. } => Some((t0, t1)),
+        }
+    }
+
+    /// The largest density anywhere.
+    #[inline]
+    pub fn max(&self) -> f32 {
+        match self {
+            Self::Constant(density) => *density,
+            Self::Height { .. } => 1.0,
+            Self::Grid(grid) => grid.max(),
+        }
+    }
+
+    /// ∫ density dt along `line` from `t0` to `t1 ≥ t0`.
+    #[inline]
+    pub(crate) fn column_on(&self, line: &Line, t0: f64, t1: f64) -> f64 {
+        match *self {
+            // Never 0 · ∞.
+            Self::Constant(0.0) => 0.0,
+            Self::Constant(density) => f64::from(density) * (t1 - t0),
+            Self::Height { base, scale_height } => {
+                HeightProfile::new(base, scale_height, line).column(t0, t1)
+            }
+            Self::Grid(ref grid) => GridProfile::new(grid, line).column(t0, t1),
+        }
     }
 
     /// This density restricted to a ray.
     #[inline]
-    pub(crate) fn along(&self, line: &Line) -> Profile {
+    pub(crate) fn along(&self, line: &Line) -> Profile<'_> {
         match *self {
             Self::Constant(density) => Profile::Constant(density.into()),
             Self::Height { base, scale_height } => {
                 Profile::Height(HeightProfile::new(base, scale_height, line))
             }
+            Self::Grid(ref grid) => Profile::Grid(Box::new(GridProfile::new(grid, line))),
         }
     }
 }
 
 /// A density as a function of the distance along one ray.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Profile {
+#[derive(Clone, Debug)]
+pub(crate) enum Profile<'a> {
     Constant(f64),
     Height(HeightProfile),
+    /// Boxed, so that rays through other media carry no more than before.
+    Grid(Box<GridProfile<'a>>),
 }
 
-impl Profile {
+impl Profile<'_> {
+    /// Prepares for many questions about the distances from `t0` to `t1`.
+    #[inline]
+    pub(crate) fn prepare(&mut self, t0: f64, t1: f64) {
+        if let Self::Grid(grid) = self {
+            grid.tabulate(t0, t1);
+        }
+    }
+
     /// The density at distance `t`.
     #[inline]
     pub(crate) fn value(&self, t: f64) -> f64 {
         match self {
             Self::Constant(density) => *density,
             Self::Height(height) => height.value(t),
+            Self::Grid(grid) => grid.value(t),
         }
     }
 
@@ -119,6 +182,7 @@ impl Profile {
             Self::Constant(0.0) => 0.0,
             Self::Constant(density) => density * (t1 - t0),
             Self::Height(height) => height.column(t0, t1),
+            Self::Grid(grid) => grid.column(t0, t1),
         }
     }
 
@@ -131,6 +195,7 @@ impl Profile {
         match self {
             Self::Constant(density) => t0 + column / density,
             Self::Height(height) => height.invert(t0, column),
+            Self::Grid(grid) => grid.invert(t0, column),
         }
     }
 
@@ -139,22 +204,27 @@ impl Profile {
         match self {
             Self::Constant(_) => [DVec3::ZERO; 2],
             Self::Height(height) => height.gradient_moments(t0, t1).map(|m| DVec3::Y * m),
+            Self::Grid(grid) => grid.gradient_moments(t0, t1),
         }
     }
 
-    /// ∂density/∂y at distance `t`; no density varies sideways.
-    pub(crate) fn vertical_gradient(&self, t: f64) -> f64 {
+    /// ∇density at distance `t`.
+    pub(crate) fn gradient(&self, t: f64) -> DVec3 {
         match self {
-            Self::Constant(_) => 0.0,
-            Self::Height(height) => height.vertical_gradient(t),
+            Self::Constant(_) => DVec3::ZERO,
+            Self::Height(height) => DVec3::Y * height.vertical_gradient(t),
+            Self::Grid(grid) => grid.gradient(t),
         }
     }
 
-    /// ∫ tʲ ∂²density/∂y² dt from `t0` to `t1` for j = 0, 1, 2; for infinite `t1` as [`Profile::gradient_moments`].
-    pub(crate) fn hessian_moments(&self, t0: f64, t1: f64) -> [f64; 3] {
+    /// ∫ tʲ Hdensity dt from `t0` to `t1` for j = 0, 1, 2; for infinite `t1` as [`Profile::gradient_moments`].
+    pub(crate) fn hessian_moments(&self, t0: f64, t1: f64) -> [DMat3; 3] {
         match self {
-            Self::Constant(_) => [0.0; 3],
-            Self::Height(height) => height.hessian_moments(t0, t1),
+            Self::Constant(_) => [DMat3::ZERO; 3],
+            Self::Height(height) => height
+                .hessian_moments(t0, t1)
+                .map(|m| DMat3::from_diagonal(DVec3::Y * m)),
+            Self::Grid(grid) => grid.hessian_moments(t0, t1),
         }
     }
 }

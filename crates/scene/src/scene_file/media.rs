@@ -124,15 +124,21 @@ impl Default for Density {
 }
 
 impl Density {
-    /// The same density placed in the world; `None` for one that needs another file.
-    pub fn placed(&self) -> Option<tyndall_media::Density> {
+    /// The same density placed in the world; `grid` does so for one that needs another file.
+    ///
+    /// # Errors
+    /// Those of `grid`.
+    pub fn placed<E>(
+        &self,
+        grid: impl FnOnce(&Grid) -> Result<tyndall_media::Density, E>,
+    ) -> Result<tyndall_media::Density, E> {
         match self {
-            Self::Constant(density) => Some(tyndall_media::Density::Constant(density.get())),
-            Self::Height(height) => Some(tyndall_media::Density::Height {
+            Self::Constant(density) => Ok(tyndall_media::Density::Constant(density.get())),
+            Self::Height(height) => Ok(tyndall_media::Density::Height {
                 base: height.base.get(),
                 scale_height: height.scale_height.get(),
             }),
-            Self::Grid(_) => None,
+            Self::Grid(written) => grid(written),
         }
     }
 }
