@@ -63,19 +63,6 @@ pub enum SceneError {
     #[error(transparent)]
     SceneFile(#[from] Box<SceneFileError>),
 
-    /// The scene asks for something that this version cannot do yet.
-    #[error("{what} is not supported yet; {mend} (at `{field}`, {place})")]
-    Unsupported {
-        /// What was asked for.
-        what: String,
-        /// What would do instead.
-        mend: String,
-        /// Path of the field, as in `media[0].density`.
-        field: String,
-        /// Where it stands.
-        place: Place,
-    },
-
     /// A glTF file is at fault.
     #[error("{error} ({})", path.display())]
     Gltf {
