@@ -57,7 +57,7 @@ impl Media {
         let mut tau = Vec3::ZERO;
         for medium in &self.list {
             if !medium.is_vacuum()
-                && let Some((t0, t1)) = medium.clip(&line, t_max.into())
+                && let Some((t0, t1)) = medium.region().clip_line(&line, t_max.into())
             {
                 tau += depth(medium.sigma_t(), medium.density().column_on(&line, t0, t1));
             }

@@ -75,10 +75,7 @@ impl Density {
     /// Exact, see [`Media::optical_depth`](crate::Media::optical_depth); 0 where the density is 0, however long the ray.
     pub fn column(&self, ray: &Ray, t0: f32, t1: f32) -> f32 {
         let line = ray.into();
-        match self.clip(&line, t0.into(), t1.into()) {
-            Some((t0, t1)) => self.column_on(&line, t0, t1) as f32,
-            None => 0.0,
-        }
+        self.column_on(&line, t0.into(), t1.into()) as f32
     }
 
     /// The distance t in [`t0`, `t1`] at which the column from `t0` reaches `column`; `None` where all of it is less.
@@ -129,7 +126,7 @@ impl Density {
             Self::Height { base, scale_height } => {
                 HeightProfile::new(base, scale_height, line).column(t0, t1)
             }
-            Self::Grid(ref grid) => GridProfile::new(grid, line).column(t0, t1),
+            Self::Grid(ref grid) => grid.column(line, t0, t1),
         }
     }
 

@@ -226,6 +226,15 @@ impl Grid {
         (t0 < t1).then_some((t0, t1))
     }
 
+    /// ∫ density dt along a line from `t0` to `t1`.
+    ///
+    /// Not inlined, so that rays through other media need not make room for it.
+    #[inline(never)]
+    pub(crate) fn column(&self, line: &Line, t0: f64, t1: f64) -> f64 {
+        self.clip(line, t0, t1)
+            .map_or(0.0, |(t0, t1)| GridProfile::new(self, line).column(t0, t1))
+    }
+
     /// How far, in metres, a point near the faces of the box around the grid is from the nearest, and that face's outward unit normal.
     pub(crate) fn nearest_face(&self, p: DVec3) -> Option<(f64, DVec3)> {
         let [low, high] = self.domain?;
