@@ -175,7 +175,15 @@ fn a_file_that_is_not_the_scenes_whole_cache_is_refused() {
     for (at, message) in [
         (0, "not a cache file"),
         (8, "version"),
-        (12, "cut short"),
+        // The length grows where the bit was not set, and shrinks where it was.
+        (
+            12,
+            if whole[12] & 0x10 == 0 {
+                "cut short"
+            } else {
+                "damaged"
+            },
+        ),
         (19, "cut short"),
         (20, "damaged"),
         (whole.len() / 2, "damaged"),
@@ -237,6 +245,72 @@ fn frames_do_not_depend_on_how_they_are_divided() {
     assert!(
         pixels(&folder, "one.00.exr") != pixels(&folder, "one.03.exr"),
         "the camera moves"
+    );
+}
+
+#[test]
+fn filling_that_the_time_limit_ends_is_gone_on_with() {
+    let folder = folder();
+    let records = |options: &str| {
+        let (status, stderr) = run(&folder, &format!("render room.ron --error 0.05 {options}"));
+        assert_eq!(status, Some(0), "{stderr}");
+        let output = run_tyndall(folder.path(), &["info", "room.cache", "--json"]);
+        let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let count = info["records"]["surface"]["count"].as_u64().unwrap_or(0);
+        (count, info["views"].as_u64().unwrap())
+    };
+    let (first, views) = records("--fill-only --cache-out room.cache --time-limit 0.2");
+    assert_eq!(views, 0, "the view lacks records");
+    let (second, views) = records("--fill-only --cache-in room.cache --cache-out room.cache");
+    assert!(second > first, "{first} {second}");
+    assert_eq!(views, 1);
+}
+
+#[test]
+fn a_crop_without_time_shows_something() {
+    let folder = folder();
+    succeed(
+        &folder,
+        "render room.ron --quiet --cache-out room.cache --fill-only",
+    );
+    for y in [0, 9, 11] {
+        let crop = format!("--crop 0,{y},22,5 --time-limit 0");
+        succeed(
+            &folder,
+            &format!("render room.ron --quiet --cache-in room.cache {crop} -o x.exr"),
+        );
+        let image = pixels(&folder, "x.exr");
+        assert!(image.samples["G"].iter().sum::<f32>() > 0.0, "{y}");
+    }
+}
+
+#[test]
+fn places_far_apart_do_not_share_light() {
+    let folder = folder();
+    // Cells of both balls have the same coordinates but for a multiple of 2 to the 17th.
+    let ball = |x: f32| {
+        format!(
+            "Medium(region: Sphere(center: ({x:?}, 0, 0), radius: 1), sigma_t: (1, 1, 1), albedo: (0.9, 0.9, 0.9))"
+        )
+    };
+    let lamp = |x: f32| format!("Point(position: ({x:?}, 1.5, 0), intensity: (1, 1, 1))");
+    let key = |frame: u32, x: f32| {
+        format!("Key(frame: {frame}, eye: ({x:?}, 0, 3), target: ({x:?}, 0, 0), vfov: 45)")
+    };
+    let (a, b) = (-8192.0, 8192.0);
+    let scene = format!(
+        "Scene(camera: Path([{}, {}]), film: Film(width: 8, height: 8), lights: [{}, {}], media: [{}, {}])",
+        key(0, a),
+        key(1, b),
+        lamp(a),
+        lamp(b),
+        ball(a),
+        ball(b)
+    );
+    fs::write(folder.path().join("far.ron"), scene).unwrap();
+    succeed(
+        &folder,
+        "render far.ron --quiet --error 0.2 --spp 2 --frames 0..2 -o far.#.exr",
     );
 }
 

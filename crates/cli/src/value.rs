@@ -57,6 +57,9 @@ pub(crate) fn depth(text: &str) -> Result<Depth, String> {
     text.parse().map_err(allowed)
 }
 
+/// Frames of one command, at most: each view's places for records have random numbers of their own.
+const MOST_FRAMES: usize = 1 << 16;
+
 /// Numbers of frames, `A..B` without B or `A..=B` with it.
 pub(crate) fn frames(text: &str) -> Result<Range<u32>, String> {
     let range = text.split_once("..").and_then(|(first, end)| {
@@ -67,8 +70,10 @@ pub(crate) fn frames(text: &str) -> Result<Range<u32>, String> {
         };
         Some(first..end)
     });
-    let range = range.filter(|range| !range.is_empty());
-    range.ok_or_else(|| "frames A..B with A below B are wanted, as in 0..48".to_owned())
+    let is_sound = |range: &Range<u32>| !range.is_empty() && range.len() <= MOST_FRAMES;
+    range.filter(is_sound).ok_or_else(|| {
+        format!("frames A..B with A below B, at most {MOST_FRAMES}, are wanted, as in 0..48")
+    })
 }
 
 /// A list of layers.

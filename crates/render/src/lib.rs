@@ -60,7 +60,7 @@ pub mod image_file;
 pub mod info;
 pub mod integrator;
 pub mod layers;
-pub mod noise;
+mod noise;
 pub mod options;
 pub mod probe;
 pub mod relative;

@@ -27,6 +27,8 @@ pub(crate) struct Region {
     pub(crate) film: Film,
     /// The 5 × 5 median of the first samples, per channel and pixel.
     smooth: [Vec<f32>; 3],
+    /// The sum of the first samples' means over pixels and channels: lone lit pixels leave no trace in medians.
+    light: f64,
 }
 
 impl Region {
@@ -53,7 +55,12 @@ impl Region {
             };
             rows.flat_map(row).copied().collect()
         });
-        Ok(Self { film, smooth })
+        let light = film.colour().iter().flatten().map(|&v| f64::from(v)).sum();
+        Ok(Self {
+            film,
+            smooth,
+            light,
+        })
     }
 
     /// What the variance of one sample adds to the squared relative error: the mean over pixels and channels of a block, which is counted
@@ -112,12 +119,8 @@ impl Rule {
     ///
     /// Samples in proportion to the root of what one sample's variance adds to the squared error need the fewest in all.
     pub(crate) fn new(pilot: &[Region], target: f64) -> (Self, f64) {
-        let light = |region: &Region| {
-            let values = region.smooth.iter().flatten();
-            values.map(|&v| f64::from(v)).sum::<f64>()
-        };
         let n: f64 = pilot.iter().map(|region| region.film.len() as f64).sum();
-        let mean = pilot.iter().map(light).sum::<f64>() / (3.0 * n);
+        let mean = pilot.iter().map(|region| region.light).sum::<f64>() / (3.0 * n);
         let floor = 0.01 * mean * mean;
         let (mut roots, mut squared) = (0.0, 0.0);
         for region in pilot {
@@ -141,7 +144,12 @@ impl Rule {
             for i in region.pixels(block) {
                 let taken = region.film.taken(i);
                 let most = f64::from(taken.saturating_mul(GROWTH).min(MOST_SAMPLES));
-                let goal = wanted.ceil().min(most) as u32;
+                // Where it is not a number there is nothing to aim at.
+                let goal = if wanted.is_nan() {
+                    0
+                } else {
+                    wanted.ceil().min(most) as u32
+                };
                 // Even, so that the film's halves stay alike.
                 goals[i] = goal.saturating_add(goal & 1).max(taken);
             }
@@ -283,6 +291,35 @@ mod tests {
             let is_noisy = (4..8).contains(&x) && y < 4;
             assert_eq!(*goal > 8, is_noisy, "{x} {y}");
         }
+    }
+
+    #[test]
+    fn a_lone_lit_pixel_on_black_has_an_end() {
+        let layers: LayerSet = "beauty".parse().unwrap();
+        let mut film = Film::new(FRAME, Crop::whole(FRAME), layers.clone()).unwrap();
+        for mut row in film.rows() {
+            for x in row.columns() {
+                for sample in 0..8 {
+                    let is_lit = (x, row.y) == (5, 1);
+                    let surface = if is_lit {
+                        1.0 + 0.1 * sample as f32
+                    } else {
+                        0.0
+                    };
+                    let pixel = Pixel {
+                        surface: Vec3::splat(surface),
+                        ..Pixel::default()
+                    };
+                    row.add(x, sample, &pixel);
+                }
+            }
+        }
+        let region = Region::new(Crop::whole(FRAME), FRAME, &layers, &film).unwrap();
+        // All medians are 0; the mean is not.
+        let (rule, noise) = Rule::new(std::slice::from_ref(&region), 0.5);
+        assert!(noise > 0.0 && noise.is_finite(), "{noise}");
+        let goals = rule.goals(&region);
+        assert!(goals[15] > 8 && goals[0] == 8, "{goals:?}");
     }
 
     #[test]

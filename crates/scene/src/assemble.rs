@@ -77,6 +77,7 @@ impl Assembly<'_> {
             media,
             bounds,
             definition: digest::definition(file, self.options),
+            own_files: usize::from(!self.text.is_empty()),
             warnings: self.warnings,
             files: self.files,
         })

@@ -6,7 +6,6 @@ use crate::error::SceneError;
 use crate::load::LoadOptions;
 use crate::scene::Scene;
 use crate::scene_file::SceneFile;
-use std::path::Path;
 use xxhash_rust::xxh3::Xxh3;
 
 /// The scene file's own words on lights and media, and the fog that the user added.
@@ -30,7 +29,7 @@ impl Scene {
             hash.update(bytes);
         };
         add(self.definition.as_bytes());
-        for path in self.files.iter().filter(|path| !is_scene_file(path)) {
+        for path in self.files.iter().skip(self.own_files) {
             let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
                 what: "file of the scene",
                 source,
@@ -40,11 +39,6 @@ impl Scene {
         }
         Ok(hash.digest128())
     }
-}
-
-fn is_scene_file(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("ron"))
 }
 
 #[cfg(test)]

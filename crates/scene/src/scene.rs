@@ -38,6 +38,8 @@ pub struct Scene {
     pub files: Vec<PathBuf>,
     /// What the scene file says of lights and media; see [`Scene::digest`].
     pub(crate) definition: String,
+    /// How many of the first files are the scene file itself: one, or none for a bare glTF file.
+    pub(crate) own_files: usize,
 }
 
 /// What a scene file asks of the renderer; the command line may ask otherwise.

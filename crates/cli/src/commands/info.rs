@@ -19,6 +19,14 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
+    if CacheInfo::is_cache(&args.file) {
+        let cache = CacheInfo::of(&args.file)?;
+        return if args.json {
+            output::print_json(&cache)
+        } else {
+            output::print(&cache_text(&cache))
+        };
+    }
     match ending.as_str() {
         "ron" | "glb" | "gltf" => {
             let options = LoadOptions {
@@ -47,14 +55,6 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
                 output::print_json(&volume)
             } else {
                 output::print(&volume_text(&volume))
-            }
-        }
-        _ if CacheInfo::is_cache(&args.file) => {
-            let cache = CacheInfo::of(&args.file)?;
-            if args.json {
-                output::print_json(&cache)
-            } else {
-                output::print(&cache_text(&cache))
             }
         }
         _ => Err(CliError::UnknownKind {

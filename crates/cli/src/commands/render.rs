@@ -5,6 +5,7 @@ use crate::error::CliError;
 use crate::numbered::{has_place, numbered};
 use crate::output;
 use crate::progress::Bar;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tyndall_render::image_file::{
@@ -29,10 +30,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         check_place(path)?;
     }
     let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
+    // Records may go back where they came from.
+    let read = args.cache_in.as_ref();
+    let read = read.and_then(|path| path.canonicalize().ok());
     let kept = args
         .cache_out
         .iter()
-        .filter(|&path| args.cache_in.as_ref() != Some(path));
+        .filter(|path| read.is_none() || path.canonicalize().ok() != read);
     let written = jobs
         .iter()
         .flat_map(|job| job.outputs.iter().chain(&job.stats));
@@ -69,6 +73,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     }
     if args.fill_only {
         bar.finish();
+        if renderer.is_cut_short() {
+            output::warn([
+                "the time limit ended the filling of the cache; a render that starts from the file goes on with it",
+            ]);
+        }
         return Ok(());
     }
     let mut since = start;
@@ -178,15 +187,14 @@ fn apart<'a>(
     outputs: impl Iterator<Item = &'a PathBuf>,
 ) -> Result<(), CliError> {
     let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let mut taken: Vec<PathBuf> = inputs.map(|path| real(path)).collect();
+    let mut taken: HashSet<PathBuf> = inputs.map(|path| real(path)).collect();
     for output in outputs {
         let place = real(output);
-        if taken.contains(&place) {
+        if !taken.insert(place) {
             return Err(CliError::Overwrites {
                 path: output.clone(),
             });
         }
-        taken.push(place);
     }
     Ok(())
 }

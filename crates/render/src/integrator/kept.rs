@@ -98,7 +98,7 @@ impl Run<'_> {
             scene: self.digest()?,
             max_depth: self.max_depth,
             method: self.options.method.unwrap_or_default(),
-            error: self.error,
+            error: prepared.error.unwrap_or(self.error),
             prepared: Cow::Borrowed(prepared),
         };
         let failed = |reason: String| RenderError::Write {
@@ -121,18 +121,25 @@ impl Run<'_> {
 /// Whether a file begins as cache files do.
 pub(super) fn is_cache(path: &Path) -> bool {
     let mut magic = [0; MAGIC.len()];
+    if !path.is_file() {
+        return false;
+    }
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut magic));
     read.is_ok() && magic == MAGIC
 }
 
 /// Reads a cache file, whatever scene it is for; tells its bytes, too.
 pub(super) fn read(path: &Path) -> Result<(Contents<'static>, usize), RenderError> {
-    let bytes = std::fs::read(path).map_err(|error| RenderError::Cache {
+    let unreadable = |reason: String| RenderError::Cache {
         path: path.to_owned(),
-        fault: CacheFault::Unreadable {
-            reason: error.to_string(),
-        },
-    })?;
+        fault: CacheFault::Unreadable { reason },
+    };
+    // A device or pipe may never end.
+    let metadata = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
+    if !metadata.is_file() {
+        return Err(unreadable("it is no file".to_owned()));
+    }
+    let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
     let contents = parse(&bytes).map_err(|fault| RenderError::Cache {
         path: path.to_owned(),
         fault,

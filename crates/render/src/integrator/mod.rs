@@ -75,6 +75,8 @@ pub struct Renderer<'s> {
     prepared: Prepared,
     /// What the filling took since the last image, s.
     fill_s: f64,
+    /// Views that were filled, or begun, since the last image.
+    begun: Vec<View>,
 }
 
 impl<'s> Renderer<'s> {
@@ -112,6 +114,7 @@ impl<'s> Renderer<'s> {
             pool,
             prepared: Prepared::default(),
             fill_s: 0.0,
+            begun: Vec::new(),
         })
     }
 
@@ -138,7 +141,8 @@ impl<'s> Renderer<'s> {
         let mut views: Vec<View> = Vec::new();
         for &camera in cameras {
             let view = View::new(camera, self.run.frame);
-            if !self.prepared.is_for(&view) && !views.contains(&view) {
+            let is_known = self.prepared.is_for(&view) || self.begun.contains(&view);
+            if !is_known && !views.contains(&view) {
                 views.push(view);
             }
         }
@@ -148,7 +152,13 @@ impl<'s> Renderer<'s> {
         let start = Instant::now();
         let prepared = std::mem::take(&mut self.prepared);
         self.prepared = self.pool.install(|| self.run.prepare_for(&views, prepared));
+        self.begun.extend(views);
         self.fill_s += start.elapsed().as_secs_f64();
+    }
+
+    /// Whether a time limit ended the filling; the next frame, or who reads the cache file, goes on with it.
+    pub fn is_cut_short(&self) -> bool {
+        self.prepared.is_cut_short()
     }
 
     /// Renders the frame of this number as it is seen from `camera`; frames of other numbers have other random numbers. Fills what it
@@ -171,6 +181,7 @@ impl<'s> Renderer<'s> {
         outcome.stats.threads = self.pool.current_num_threads();
         outcome.stats.peak_rss_mib = peak_rss_mib();
         self.fill_s = 0.0;
+        self.begun.clear();
         self.prepared.forget_costs();
         self.run.start = Instant::now();
         Ok(outcome)

@@ -25,6 +25,8 @@ pub(super) struct Prepared {
     pub(super) views: Vec<View>,
     /// How far off its parts may be; `None` where nothing was planned.
     plan: Option<Plan>,
+    /// The error that the images it was made for were to have.
+    pub(super) error: Option<f32>,
     pub(super) field: Option<FilledField>,
     /// Whether camera rays read multiple scattering from the field itself.
     pub(super) reads_field: bool,
@@ -69,12 +71,16 @@ impl Prepared {
 
     /// Whether the time limit ended any of it.
     pub(super) fn is_cut_short(&self) -> bool {
+        self.lacks_records() || self.field.as_ref().is_some_and(|filled| filled.cut_short)
+    }
+
+    /// Whether the time limit ended the filling of caches.
+    fn lacks_records(&self) -> bool {
         let media = [&self.multiple, &self.sky, &self.single]
             .into_iter()
             .flatten();
         media.into_iter().any(|filled| filled.cut_short)
             || self.surface.as_ref().is_some_and(|filled| filled.cut_short)
-            || self.field.as_ref().is_some_and(|filled| filled.cut_short)
             || self.deadline_passed
     }
 
@@ -142,15 +148,17 @@ impl Prepared {
 impl Run<'_> {
     /// Computes what samples from new `views` will read, beside what was computed for others.
     pub(super) fn prepare_for(&self, views: &[View], known: Prepared) -> Prepared {
+        let error = known.error;
         let mut prepared = if self.is_jarosz08() {
             self.jarosz08(views, known)
-        } else if known.views.is_empty() {
+        } else if known.plan.is_none() {
             self.prepare(views)
         } else {
             self.extend(views, known)
         };
+        prepared.error = error.or(Some(self.error));
         // What the time limit ended is to be gone on with.
-        if !prepared.is_cut_short() {
+        if !prepared.lacks_records() {
             prepared.views.extend(views);
         }
         prepared
@@ -168,6 +176,7 @@ impl Run<'_> {
         let reach = self.reach(field.as_ref());
         let pilot = self.pilot(views, reach);
         let plan = pilot.plan(self.error);
+        let is_planned = !has_passed(self.deadline(FILL_DEADLINE));
         let held_out = HeldOut {
             scene: self.scene,
             views,
@@ -223,7 +232,8 @@ impl Run<'_> {
         prepared.deadline_passed = has_passed(self.deadline(FILL_DEADLINE));
         prepared.rays = rays;
         prepared.field = field;
-        prepared.plan = Some(plan);
+        // A pilot that time ended knows too little: who goes on begins anew.
+        prepared.plan = is_planned.then_some(plan);
         prepared
     }
 

@@ -118,16 +118,22 @@ impl Sampling<'_> {
         for of_pilot in &regions {
             region.film.adopt(&of_pilot.film);
         }
-        let mut timed_out;
-        loop {
+        drop(begun);
+        let mut timed_out = region.film.has_gaps();
+        while !timed_out {
             let goals = rule.goals(&region);
-            timed_out = !self.reach_goals(&mut [&mut region.film], &[goals], &mut tally);
-            if timed_out || region.meets(&rule.goals(&region)) {
+            if region.meets(&goals) {
                 break;
             }
+            timed_out = !self.reach_goals(&mut [&mut region.film], &[goals], &mut tally);
         }
         let mut film = Film::new(frame, crop, layers.clone())?;
         film.adopt(&region.film);
+        if film.has_gaps() {
+            // The one row that is always taken may stand in the margin.
+            let goals = vec![FIRST_SAMPLES; film.len()];
+            self.reach_goals(&mut [&mut film], &[goals], &mut tally);
+        }
         Ok((film, tally, timed_out))
     }
 

@@ -81,10 +81,6 @@ pub(super) struct Place {
     pub(super) kind: Kind,
 }
 
-/// Bits of a lattice coordinate in a key. Coordinates repeat every 2¹⁷ cells; where widths grow with the distance to the eye, cells of
-/// one size all lie closer together.
-const BITS: u32 = 17;
-
 impl Place {
     pub(super) fn of(p: Vec3, exponent: i32, kind: Kind) -> Self {
         Self {
@@ -103,15 +99,15 @@ impl Place {
         }
     }
 
-    pub(super) fn key(self) -> u64 {
-        let mask = (1_u64 << BITS) - 1;
-        let [x, y, z] = self.lattice.to_array().map(|c| c as u64 & mask);
+    /// A number for each place.
+    pub(super) fn key(self) -> u128 {
+        let [x, y, z] = self.lattice.to_array().map(|c| u128::from(c as u32));
         let kind = match self.kind {
-            Kind::Medium => 6,
-            Kind::Surface(side) => u64::from(side),
+            Kind::Medium => u128::from(u8::MAX),
+            Kind::Surface(side) => u128::from(side),
         };
-        let size = (self.exponent + 128) as u64;
-        (((((size << 3 | kind) << BITS) | x) << BITS | y) << BITS) | z
+        let size = (self.exponent + 128) as u128;
+        ((((size << 8 | kind) << 32 | x) << 32) | y) << 32 | z
     }
 }
 
@@ -163,6 +159,12 @@ impl Sum {
         self.indirect += other.indirect;
     }
 
+    /// Whether it is what light can add up to.
+    fn is_light(&self) -> bool {
+        let is_light = |v: DVec3| v.is_finite() && v.min_element() >= 0.0;
+        is_light(self.all) && is_light(self.indirect)
+    }
+
     pub(super) fn mean(&self) -> Light {
         let n = f64::from(self.n.max(1));
         Light {
@@ -193,7 +195,7 @@ pub(super) struct Side {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells {
     pub(super) sides: Vec<Side>,
-    first_sides: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
+    first_sides: HashMap<u128, u32, BuildHasherDefault<KeyHasher>>,
 }
 
 impl Cells {
@@ -201,20 +203,26 @@ impl Cells {
     pub(super) fn from_sides(sides: Vec<Side>) -> Option<Self> {
         let mut is_first = vec![true; sides.len()];
         for (i, side) in sides.iter().enumerate() {
-            if !EXPONENTS.contains(&side.place.exponent) {
+            if !EXPONENTS.contains(&side.place.exponent) || !side.sum.is_light() {
                 return None;
             }
             if let Some(next) = side.next {
                 // Later sides stand behind earlier ones, so that there is an end to them.
                 let is_later = next as usize > i;
-                *is_first.get_mut(next as usize).filter(|_| is_later)? = false;
+                let is_same = sides.get(next as usize)?.place == side.place;
+                *is_first
+                    .get_mut(next as usize)
+                    .filter(|_| is_later && is_same)? = false;
             }
         }
         let numbered = (0..).zip(&sides).zip(is_first);
-        let first_sides = numbered
-            .filter(|(_, is_first)| *is_first)
-            .map(|((i, side), _)| (side.place.key(), i))
-            .collect();
+        let firsts = numbered.filter(|(_, is_first)| *is_first);
+        let mut first_sides = HashMap::default();
+        for ((i, side), _) in firsts {
+            if first_sides.insert(side.place.key(), i).is_some() {
+                return None;
+            }
+        }
         Some(Self { sides, first_sides })
     }
 
@@ -263,7 +271,7 @@ impl Cells {
     }
 }
 
-/// Hashes one `u64` the same way in every run (Fibonacci hashing, Knuth, TAOCP 3, §6.4).
+/// Hashes one number the same way in every run (Fibonacci hashing, Knuth, TAOCP 3, §6.4).
 #[derive(Clone, Copy, Debug, Default)]
 struct KeyHasher(u64);
 
@@ -281,5 +289,10 @@ impl Hasher for KeyHasher {
     fn write_u64(&mut self, key: u64) {
         let product = key.wrapping_mul(0x9E37_79B9_7F4A_7C15);
         self.0 = product ^ (product >> 32);
+    }
+
+    fn write_u128(&mut self, key: u128) {
+        self.write_u64((key >> 64) as u64);
+        self.write_u64(self.0 ^ key as u64);
     }
 }

@@ -62,6 +62,9 @@ impl Light {
         }
     }
 
+    /// Numbers of records, at most.
+    const MOST_RECORDS: usize = 1 << 40;
+
     /// The random numbers of record number `index`.
     fn key(self, seed: u64, index: u64) -> Key {
         Key {
@@ -217,6 +220,7 @@ impl<K: Kind> Fill<'_, K> {
         mut filled: Filled<K::Tag>,
         progress: &dyn Progress,
     ) -> Filled<K::Tag> {
+        filled.cut_short = false;
         let mut order: Vec<usize> = (0..self.views.len()).collect();
         // Views far apart first: what lies between them has its records then.
         order.sort_by_key(|&number| (number as u32).reverse_bits());

@@ -1,6 +1,6 @@
 //! A filled cache as it is kept in a file: its records and tags; the index is built anew.
 
-use super::Filled;
+use super::{Filled, Light};
 use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
 use tyndall_cache::{Cache, Record};
@@ -32,6 +32,12 @@ impl<T: Clone> TryFrom<Stored<'_, T>> for Filled<T> {
         let (n_records, n_tags) = (stored.records.len(), stored.tags.len());
         if n_records != n_tags {
             return Err(format!("there are {n_records} records with {n_tags} tags"));
+        }
+        if stored.asked < n_records || stored.asked >= Light::MOST_RECORDS {
+            let asked = stored.asked;
+            return Err(format!(
+                "{asked} places cannot have asked for {n_records} records"
+            ));
         }
         let records = stored.records.iter().copied();
         let mut cache = Cache::tagged();
