@@ -42,14 +42,16 @@ pub fn tyndall() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         let format = "--message-format=json-render-diagnostics";
-        let mut arguments = vec!["build", "--package=tyndall-cli", format];
+        // An example beside it asks for the features that tests ask for: alone, the program's libraries would be built once more.
+        let mut arguments = vec!["build", "--bin=tyndall", "--example=march", format];
         if !cfg!(debug_assertions) {
             arguments.push("--release");
         }
         let messages = cargo(&arguments);
         let executable = messages.lines().find_map(|line| {
             let message: Value = serde_json::from_str(line).ok()?;
-            Some(PathBuf::from(message["executable"].as_str()?))
+            let executable = message["executable"].as_str()?;
+            (message["target"]["name"] == "tyndall").then(|| PathBuf::from(executable))
         });
         executable.expect("cargo names the program it built")
     })
