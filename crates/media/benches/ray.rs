@@ -96,11 +96,15 @@ fn rays(c: &mut Criterion) {
 }
 
 fn phase(c: &mut Criterion) {
-    for g in [0.0, 0.7] {
-        let Ok(phase) = PhaseFunction::henyey_greenstein(g) else {
-            return;
-        };
-        let mut group = c.benchmark_group(format!("henyey_greenstein_{g}"));
+    let hg = |g| PhaseFunction::henyey_greenstein(g).unwrap_or_default();
+    let double = PhaseFunction::mixture(&[(0.7, hg(0.8)), (0.3, hg(-0.3))]);
+    for (name, phase) in [
+        ("isotropic", PhaseFunction::Isotropic),
+        ("henyey_greenstein", hg(0.7)),
+        ("rayleigh", PhaseFunction::Rayleigh),
+        ("double_henyey_greenstein", double.unwrap_or_default()),
+    ] {
+        let mut group = c.benchmark_group(name);
         group.bench_function("eval", |b| {
             b.iter(|| phase.eval(black_box(Vec3::X), black_box(Vec3::Y)));
         });
