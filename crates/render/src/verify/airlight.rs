@@ -4,11 +4,11 @@
 //! Time Rendering"; the other phase functions by quadrature to 20 digits. The lamp of 1 W/sr stands at the origin.
 
 use super::measure::{Channel, ROUNDING, World, estimate, pixel};
-use super::world::{Lamps, Shape, Solid, Solids, fog};
+use super::world::{Lamps, Shape, Solid, Solids, fog, phase};
 use super::{Budget, Row, Task};
 use glam::Vec3;
 use tyndall_math::Ray;
-use tyndall_media::Region;
+use tyndall_media::{PhaseFunction, Region};
 
 const FAMILY: &str = "E2a";
 const SAMPLES: usize = 150_000;
@@ -25,6 +25,7 @@ struct Case {
     h: f32,
     length: f32,
     exact: [f64; G.len()],
+    rayleigh: f64,
 }
 
 const CASES: [Case; 8] = [
@@ -44,6 +45,7 @@ const CASES: [Case; 8] = [
             0.001848726179049489,
             0.00017518030558483815,
         ],
+        rayleigh: 0.004440061913410513,
     },
     Case {
         name: "inf",
@@ -61,6 +63,7 @@ const CASES: [Case; 8] = [
             0.0018487272805392397,
             0.00017518040600116163,
         ],
+        rayleigh: 0.0044401189851655375,
     },
     Case {
         name: "thin",
@@ -78,6 +81,7 @@ const CASES: [Case; 8] = [
             0.00959710432681371,
             0.0015401839952772114,
         ],
+        rayleigh: 0.0049705297077293565,
     },
     Case {
         name: "thick",
@@ -95,6 +99,7 @@ const CASES: [Case; 8] = [
             2.7761732970323122e-05,
             2.913594730636278e-06,
         ],
+        rayleigh: 1.567901281433641e-05,
     },
     Case {
         name: "graze",
@@ -112,6 +117,7 @@ const CASES: [Case; 8] = [
             107.74900800993223,
             1023.5296263795419,
         ],
+        rayleigh: 18.917119705420284,
     },
     Case {
         name: "graze6",
@@ -129,6 +135,7 @@ const CASES: [Case; 8] = [
             108267.78661135623,
             1076994.4093175628,
         ],
+        rayleigh: 19031.29823171453,
     },
     Case {
         name: "lightbehind",
@@ -146,6 +153,7 @@ const CASES: [Case; 8] = [
             7.50617220389267e-05,
             6.844718181700185e-06,
         ],
+        rayleigh: 0.003177440269959939,
     },
     Case {
         name: "albedo1",
@@ -163,22 +171,30 @@ const CASES: [Case; 8] = [
             0.00024361682499740955,
             2.2795192687495985e-05,
         ],
+        rayleigh: 0.000693416623762786,
     },
 ];
 
 pub(super) fn tasks() -> Vec<Task> {
     let rows = CASES.iter().flat_map(|case| {
+        let rayleigh = (
+            PhaseFunction::Rayleigh,
+            "Rayleigh".to_owned(),
+            case.rayleigh,
+        );
         G.iter()
             .zip(case.exact)
-            .map(move |(&g, exact)| (case, g, exact))
+            .map(|(&g, exact)| (phase(g), format!("g {g}"), exact))
+            .chain([rayleigh])
+            .map(move |row| (case, row))
     });
-    rows.map(|(case, g, exact)| -> Task {
-        Box::new(move |budget| vec![row(budget, case, g, exact)])
+    rows.map(|(case, (phase, name, exact))| -> Task {
+        Box::new(move |budget| vec![row(budget, case, (phase, &name), exact)])
     })
     .collect()
 }
 
-fn row(budget: &Budget, case: &Case, g: f32, exact: f64) -> Row {
+fn row(budget: &Budget, case: &Case, (phase, name): (PhaseFunction, &str), exact: f64) -> Row {
     let ray = Ray::new(Vec3::new(-case.t0, case.h, 0.0), Vec3::X);
     // A black card ends the ray; it is too small to shade anything else.
     let card = case.length.is_finite().then(|| {
@@ -193,7 +209,7 @@ fn row(budget: &Budget, case: &Case, g: f32, exact: f64) -> Row {
         case.sigma_t,
         case.sigma_s / case.sigma_t,
         Region::Everywhere,
-        g,
+        phase,
     );
     let world = World {
         geometry: &solids,
@@ -203,7 +219,7 @@ fn row(budget: &Budget, case: &Case, g: f32, exact: f64) -> Row {
     let value = pixel(&world, budget, SAMPLES, Some(1), Channel::Mean, |_| ray);
     Row::random(
         FAMILY,
-        format!("airlight {}, g {g}", case.name),
+        format!("airlight {}, {name}", case.name),
         estimate(&value),
         exact,
         ROUNDING * exact,

@@ -3,7 +3,7 @@
 //! A spherical wall around a homogeneous sphere of extinction 1, a lamp of power 1 in the centre; by superposition of E3.6.
 
 use super::measure::{Channel, Light, Point, ROUNDING, World, estimate, pixel, point_rows};
-use super::world::{Lamps, Solid, Solids, ball, fog};
+use super::world::{Lamps, Solid, Solids, ball, fog, phase};
 use super::{Budget, Row, Task};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -124,7 +124,7 @@ const INSIDE: f32 = 1.0 - 1e-6;
 impl Closed {
     fn rows(&self, budget: &Budget) -> Vec<Row> {
         let solids = Solids(vec![Solid::room(self.radius, self.reflectance, 0.0)]);
-        let media = fog(1.0, self.albedo, ball(self.radius), 0.0);
+        let media = fog(1.0, self.albedo, ball(self.radius), phase(0.0));
         let world = World {
             geometry: &solids,
             lights: &Lamps::at_origin(0.25 / PI),

@@ -7,7 +7,7 @@ use glam::Vec3;
 use std::f32::consts::PI;
 use tyndall_math::Ray;
 use tyndall_math::stats::Welford;
-use tyndall_media::{Density, Media, MediumParams, Region};
+use tyndall_media::{Density, Media, MediumParams, PhaseFunction, Region};
 
 const FAMILY: &str = "E3.5";
 const SAMPLES: usize = 90_000;
@@ -20,16 +20,59 @@ pub(super) fn tasks() -> Vec<Task> {
                 budget,
                 "F1 isotropic",
                 Vec3::ONE,
-                0.0,
+                PhaseFunction::Isotropic,
                 Density::Constant(2.0),
             )
         }),
-        Box::new(|budget| white(budget, "F1 g 0.8", Vec3::ONE, 0.8, Density::Constant(4.0))),
-        Box::new(|budget| white(budget, "F1 g -0.6", Vec3::ONE, -0.6, Density::Constant(8.0))),
-        Box::new(|budget| white(budget, "F1 height, g 0.5", Vec3::ONE, 0.5, HEIGHT)),
+        Box::new(|budget| {
+            white(
+                budget,
+                "F1 g 0.8",
+                Vec3::ONE,
+                phase(0.8),
+                Density::Constant(4.0),
+            )
+        }),
+        Box::new(|budget| {
+            white(
+                budget,
+                "F1 g -0.6",
+                Vec3::ONE,
+                phase(-0.6),
+                Density::Constant(8.0),
+            )
+        }),
+        Box::new(|budget| {
+            let rayleigh = PhaseFunction::Rayleigh;
+            white(
+                budget,
+                "F1 Rayleigh",
+                Vec3::ONE,
+                rayleigh,
+                Density::Constant(4.0),
+            )
+        }),
+        Box::new(|budget| {
+            let lobes = [(0.7, phase(0.8)), (0.3, phase(-0.3))];
+            let mixture = PhaseFunction::mixture(&lobes).unwrap_or_default();
+            white(
+                budget,
+                "F1 g 0.8 and -0.3",
+                Vec3::ONE,
+                mixture,
+                Density::Constant(4.0),
+            )
+        }),
+        Box::new(|budget| white(budget, "F1 height, g 0.5", Vec3::ONE, phase(0.5), HEIGHT)),
         Box::new(|budget| {
             let sigma = Vec3::new(0.2, 1.0, 5.0);
-            white(budget, "F2 coloured", sigma, 0.0, Density::Constant(1.0))
+            white(
+                budget,
+                "F2 coloured",
+                sigma,
+                PhaseFunction::Isotropic,
+                Density::Constant(1.0),
+            )
         }),
         Box::new(|budget| {
             let sigma = Vec3::new(0.0, 2.0, 2.0);
@@ -37,7 +80,7 @@ pub(super) fn tasks() -> Vec<Task> {
                 budget,
                 "F2 coloured, g 0.8",
                 sigma,
-                0.8,
+                phase(0.8),
                 Density::Constant(1.0),
             )
         }),
@@ -80,10 +123,16 @@ fn channel_rows(
 }
 
 /// F1, F2: albedo 1 under a white sky shows 1 everywhere.
-fn white(budget: &Budget, name: &str, sigma_t: Vec3, g: f32, density: Density) -> Vec<Row> {
+fn white(
+    budget: &Budget,
+    name: &str,
+    sigma_t: Vec3,
+    phase: PhaseFunction,
+    density: Density,
+) -> Vec<Row> {
     let media = media(MediumParams {
         region: ball(1.0),
-        phase: phase(g),
+        phase,
         density,
         ..MediumParams::new(sigma_t, Vec3::ONE)
     });
@@ -102,7 +151,7 @@ fn white(budget: &Budget, name: &str, sigma_t: Vec3, g: f32, density: Density) -
 
 /// F3, F8: a closed room whose walls emit what they do not reflect, with fog of albedo 1.
 fn room(budget: &Budget, name: &str, reflectance: f32, emission: f32, sigma_t: f32) -> Vec<Row> {
-    let media = fog(sigma_t, 1.0, ball(1.0), 0.4);
+    let media = fog(sigma_t, 1.0, ball(1.0), phase(0.4));
     let solids = Solids(vec![Solid::room(1.0, reflectance, emission)]);
     let world = World {
         geometry: &solids,
@@ -138,7 +187,7 @@ fn isothermal(budget: &Budget) -> Vec<Row> {
 /// F6: a black card in a white furnace never brightens a pixel, and the more darkens it the larger it is.
 fn card(budget: &Budget) -> Vec<Row> {
     const RADII: [f32; 3] = [0.1, 0.3, 0.6];
-    let media = fog(2.0, 1.0, ball(1.0), 0.0);
+    let media = fog(2.0, 1.0, ball(1.0), PhaseFunction::Isotropic);
     let mut before: Option<Welford> = None;
     let mut rows = Vec::new();
     for radius in RADII {
@@ -209,7 +258,11 @@ fn absorbing(_budget: &Budget) -> Vec<Row> {
     // Level at height 0.3, two metres through the box.
     let level = 6.0 * (-f64::from((0.3_f32 + 1.0) / 0.4)).exp();
     vec![
-        row("ball", &fog(3.0, 0.0, ball(1.0), 0.0), 3.0 * chord),
+        row(
+            "ball",
+            &fog(3.0, 0.0, ball(1.0), PhaseFunction::Isotropic),
+            3.0 * chord,
+        ),
         row("height", &everywhere(HEIGHT), level),
     ]
 }

@@ -4,7 +4,7 @@
 //! edges. Seen from (0.3, 0.2, 0.1), the light leaves along (0.2, 0.3, −0.9).
 
 use super::measure::{Light, Point, World, point_rows};
-use super::world::{Lamp, Lamps, Shape, Solid, Solids, fog};
+use super::world::{Lamp, Lamps, Shape, Solid, Solids, fog, phase};
 use super::{Budget, Row, Task};
 use glam::{DVec3, Vec3};
 use tyndall_math::{Key, Purpose};
@@ -175,7 +175,7 @@ pub(super) fn tasks() -> Vec<Task> {
 
 /// A lamp without extent leaves nothing to chance.
 fn point(&(g, value, gradient): &(f32, f64, [f64; 3])) -> Vec<Row> {
-    let media = fog(0.8, 0.5, Region::Everywhere, g);
+    let media = fog(0.8, 0.5, Region::Everywhere, phase(g));
     let world = World {
         geometry: &Solids::default(),
         lights: &Lamps::one(Lamp::Point {
@@ -219,7 +219,7 @@ fn extended(
     (shape, radiance): (Shape, f32),
     &(sigma_t, g, value, gradient): &Extended,
 ) -> Vec<Row> {
-    let media = fog(sigma_t, 0.5, Region::Everywhere, g);
+    let media = fog(sigma_t, 0.5, Region::Everywhere, phase(g));
     let solids = Solids(vec![Solid {
         emission: radiance,
         lamp: Some(0),

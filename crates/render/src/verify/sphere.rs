@@ -3,7 +3,7 @@
 //! The integral equation of the sphere, isotropic scattering, solved to 1e-9 (Nyström's method on graded panels).
 
 use super::measure::{Channel, Light, Point, ROUNDING, World, estimate, pixel, point_rows};
-use super::world::{Lamps, Solids, ball, fog};
+use super::world::{Lamps, Solids, ball, fog, phase};
 use super::{Budget, Row, Task};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -304,7 +304,7 @@ struct Sphere {
 
 impl Sphere {
     fn rows(&self, budget: &Budget) -> Vec<Row> {
-        let media = fog(1.0, self.albedo, ball(self.radius), 0.0);
+        let media = fog(1.0, self.albedo, ball(self.radius), phase(0.0));
         let world = World {
             geometry: &Solids::default(),
             lights: &self.lights,

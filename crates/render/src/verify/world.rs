@@ -354,11 +354,11 @@ pub(super) fn media(params: MediumParams) -> Media {
     Media::new(medium.into_iter().collect())
 }
 
-/// A homogeneous medium, alike in all channels; `g` is the mean cosine of its phase function.
-pub(super) fn fog(sigma_t: f32, albedo: f32, region: Region, g: f32) -> Media {
+/// A homogeneous medium, alike in all channels.
+pub(super) fn fog(sigma_t: f32, albedo: f32, region: Region, phase: PhaseFunction) -> Media {
     media(MediumParams {
         region,
-        phase: phase(g),
+        phase,
         ..MediumParams::new(Vec3::splat(sigma_t), Vec3::splat(albedo))
     })
 }

@@ -21,7 +21,7 @@ fn hg(g: f32) -> PhaseFunction {
 
 #[test]
 fn airlight_of_a_lamp_beside_the_ray_is_exact() {
-    // σs, σt, t0, h, then isotropic, HG −0.5, 0.5, 0.9. The rows with a finite ray of 6 m differ from these by < 1e-5.
+    // σs, σt, t0, h, then isotropic, HG −0.5, 0.5, 0.9, Rayleigh. The rows with a finite ray of 6 m differ from these by < 1e-5.
     let rows = [
         (
             0.5,
@@ -33,6 +33,7 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
                 0.002171208651,
                 0.006069084823,
                 0.001848727281,
+                0.004440118985,
             ],
         ),
         (
@@ -45,6 +46,7 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
                 0.0002724808992,
                 0.0009597241821,
                 0.000243616825,
+                0.0006934166238,
             ],
         ),
         (
@@ -52,14 +54,26 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
             1.0,
             2.0,
             1e-3,
-            [16.83526224, 23.60257898, 23.94972583, 107.749008],
+            [
+                16.83526224,
+                23.60257898,
+                23.94972583,
+                107.749008,
+                18.91711971,
+            ],
         ),
         (
             0.5,
             1.0,
             2.0,
             1e-6,
-            [16916.75437, 23988.34788, 23989.12467, 108267.7866],
+            [
+                16916.75437,
+                23988.34788,
+                23989.12467,
+                108267.7866,
+                19031.29823,
+            ],
         ),
         (
             0.5,
@@ -71,6 +85,7 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
                 0.007696717608,
                 0.0005948031704,
                 7.506172204e-05,
+                0.00317744027,
             ],
         ),
     ];
@@ -78,10 +93,14 @@ fn airlight_of_a_lamp_beside_the_ray_is_exact() {
         // The lamp stands at the origin, where f32 resolves how close the ray passes.
         let lamps = Lamps::points(&[(Vec3::ZERO, 1.0)]);
         let ray = Ray::new(Vec3::new(-t0, h, 0.0), Vec3::X);
-        for (phase, exact) in [PhaseFunction::Isotropic, hg(-0.5), hg(0.5), hg(0.9)]
-            .into_iter()
-            .zip(exact)
-        {
+        let phases = [
+            PhaseFunction::Isotropic,
+            hg(-0.5),
+            hg(0.5),
+            hg(0.9),
+            PhaseFunction::Rayleigh,
+        ];
+        for (phase, exact) in phases.into_iter().zip(exact) {
             let media = fog(sigma_t, sigma_s / sigma_t, Region::Everywhere, phase);
             let world = World {
                 geometry: &OPEN,
@@ -228,10 +247,13 @@ fn unequal_lamps_apart_add_up_in_a_room_with_walls() {
 #[test]
 fn a_white_furnace_shows_one_everywhere() {
     // Colour channels of different extinction, forward and backward scattering, thin and thick.
+    let mixture = PhaseFunction::mixture(&[(0.7, hg(0.8)), (0.3, hg(-0.3))]).unwrap();
     for (sigma, phase) in [
         (Vec3::new(0.2, 1.0, 5.0), PhaseFunction::Isotropic),
         (Vec3::new(0.0, 2.0, 2.0), hg(0.8)),
         (Vec3::splat(8.0), hg(-0.6)),
+        (Vec3::splat(4.0), PhaseFunction::Rayleigh),
+        (Vec3::splat(4.0), mixture),
     ] {
         let lamps = Lamps::sky(1.0);
         let media = Media::new(vec![
