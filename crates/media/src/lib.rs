@@ -56,6 +56,7 @@ mod line;
 pub mod march;
 mod media;
 mod medium;
+mod newton;
 pub mod phase;
 mod point;
 mod region;

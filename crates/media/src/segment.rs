@@ -5,6 +5,7 @@
 use crate::Medium;
 use crate::density::Profile;
 use crate::line::Line;
+use crate::newton;
 use glam::Vec3;
 use smallvec::SmallVec;
 
@@ -278,30 +279,14 @@ impl Stretch<'_, '_> {
         }
         // Exact while the extinction stays as at the start; where it only falls or only grows, Newton comes from one side.
         let guess = self.a + tau / self.slope(self.a);
-        let mut t = if guess > low && guess < high {
-            guess
-        } else {
-            0.5 * (low + high)
-        };
+        let excess = |t| [self.depth(t) - tau, self.slope(t)];
         // Newton needs about six steps, and after one of 1e-9 its square is left; 200 halvings are enough for any bracket.
-        for _ in 0..200 {
-            let excess = self.depth(t) - tau;
-            if excess > 0.0 {
-                high = t;
-            } else {
-                low = t;
-            }
-            let newton = t - excess / self.slope(t);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            if (next - t).abs() <= 1e-9 * t {
-                return next;
-            }
-            t = next;
-        }
-        t
+        newton::root(
+            [low, high],
+            newton::within(low, high, guess),
+            200,
+            |t| 1e-9 * t,
+            excess,
+        )
     }
 }

@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod trilinear_benchmark;
+
 use glam::{DAffine3, DMat3, DVec3, IVec3, Vec3};
 use proptest::prelude::*;
 use std::sync::Arc;
+use trilinear_benchmark::{ROWS, SPACING, sample};
 use tyndall_math::{Jet, Ray};
 use tyndall_media::grid::{BRICK_VOXELS, Grid, GridEdge, GridError, Voxels, VoxelsBuilder};
 use tyndall_media::{Density, Media, Medium, MediumParams, Region};
@@ -60,44 +63,12 @@ fn benchmark(shift: [i32; 3]) -> Arc<Voxels> {
     let bounds = [shift, shift + IVec3::new(4, 3, 2)].map(|c| c.to_array());
     voxels(0.0, bounds, move |p| {
         let [i, j, k] = (p - shift).to_array();
-        let hash = 7 * i + 13 * j + 29 * k + 3 * i * j + 5 * j * k + 11 * i * k;
-        (hash % 17 + 1) as f32 / 8.0
+        sample(i, j, k) as f32
     })
 }
 
-const SPACING: DVec3 = DVec3::new(0.5, 0.75, 1.0);
-
 #[test]
 fn the_trilinear_benchmark_is_met_to_the_last_digits_wherever_bricks_lie() {
-    let rows = [
-        // (from, to, τ, ∇τ)
-        (
-            DVec3::new(0.1, 0.2, 0.3),
-            DVec3::new(1.9, 2.0, 1.7),
-            2.3436509463205435,
-            [0.41019725183158096, 0.8422238999423247, 0.20201558111902357],
-        ),
-        (
-            DVec3::new(1.95, 0.05, 1.9),
-            DVec3::new(0.05, 2.2, 0.1),
-            3.3432550026037515,
-            [
-                -0.7483679289805344,
-                0.7106652301353559,
-                -0.020261573099377747,
-            ],
-        ),
-        (
-            DVec3::new(0.3, 1.1, 0.05),
-            DVec3::new(0.3, 1.1, 1.95),
-            1.9106874999999999,
-            [
-                -1.6080729166666665,
-                -0.37142361111111105,
-                1.0570833333333332,
-            ],
-        ),
-    ];
     // Rotated, sheared and mirrored about the benchmark's coordinates: gradients turn with it.
     let turned = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0)
         * DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
@@ -109,7 +80,7 @@ fn the_trilinear_benchmark_is_met_to_the_last_digits_wherever_bricks_lie() {
                 translation: rotation * -offset,
             };
             let media = media(benchmark(shift), map, GridEdge::Background);
-            for (a, b, tau, gradient) in rows {
+            for (a, b, tau, gradient) in ROWS {
                 let found = media.optical_depth_jet(rotation * a, rotation * b)[1];
                 let gradient = rotation * DVec3::from(gradient);
                 // Rounding of f64, of coordinates up to 510 too.

@@ -2,8 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod trilinear_benchmark;
+
 use glam::{DMat3, DVec3, Vec3};
 use proptest::prelude::*;
+use trilinear_benchmark::{ROWS, SPACING, sample};
 use tyndall_math::Jet;
 use tyndall_media::march::even_steps;
 use tyndall_media::{
@@ -60,14 +63,8 @@ fn blob() -> Field<impl Fn(DVec3) -> Jet> {
     gaussian(2.5, DVec3::new(0.9, 0.3, 0.6), 0.45)
 }
 
-/// The benchmark's trilinear grid: 5 × 4 × 3 samples, this far apart.
-const SPACING: DVec3 = DVec3::new(0.5, 0.75, 1.0);
+/// Cells of the benchmark's trilinear grid.
 const CELLS: DVec3 = DVec3::new(4.0, 3.0, 2.0);
-
-fn sample(i: i32, j: i32, k: i32) -> f64 {
-    let hash = 7 * i + 13 * j + 29 * k + 3 * i * j + 5 * j * k + 11 * i * k;
-    f64::from(hash % 17 + 1) / 8.0
-}
 
 fn trilinear() -> Field<impl Fn(DVec3) -> Jet> {
     Field(|p: DVec3| {
@@ -192,36 +189,7 @@ fn smooth_fields_have_the_exact_depth_and_gradient_in_small_steps() {
 
 #[test]
 fn trilinear_cells_are_exact_with_one_step_each() {
-    let rows = [
-        // (from, to, τ, ∇τ)
-        (
-            DVec3::new(0.1, 0.2, 0.3),
-            DVec3::new(1.9, 2.0, 1.7),
-            2.3436509463205435,
-            [0.41019725183158096, 0.8422238999423247, 0.20201558111902357],
-        ),
-        (
-            DVec3::new(1.95, 0.05, 1.9),
-            DVec3::new(0.05, 2.2, 0.1),
-            3.3432550026037515,
-            [
-                -0.7483679289805344,
-                0.7106652301353559,
-                -0.020261573099377747,
-            ],
-        ),
-        (
-            DVec3::new(0.3, 1.1, 0.05),
-            DVec3::new(0.3, 1.1, 1.95),
-            1.9106874999999999,
-            [
-                -1.6080729166666665,
-                -0.37142361111111105,
-                1.0570833333333332,
-            ],
-        ),
-    ];
-    for (a, b, tau, gradient) in rows {
+    for (a, b, tau, gradient) in ROWS {
         check(&trilinear(), [a, b], &faces(a, b), tau, gradient);
     }
 }

@@ -3,6 +3,7 @@
 //! Along the line the value is a cubic: the two-point rule of Gauss and Legendre integrates it exactly, and also its gradient
 //! times the distance and its second derivatives times the square of the distance.
 
+use crate::newton;
 use glam::{DMat3, DVec3};
 
 /// Distance of the two nodes of the rule from the middle, over the length: 1/√12 (Abramowitz and Stegun 25.4.29).
@@ -50,30 +51,18 @@ impl Cell {
 
     /// The distance at which the column is `column`, in [0, length].
     ///
-    /// Newton's method in a shrinking bracket: the value is the slope of the column, and not negative.
+    /// The value is the slope of the column, and not negative.
     pub(super) fn invert(&self, column: f64) -> f64 {
-        let (mut low, mut high) = (0.0, self.length);
-        let mut s = (self.length * column / self.column()).clamp(low, high);
+        let guess = (self.length * column / self.column()).clamp(0.0, self.length);
+        let excess = |s| [self.partial_column(s) - column, self.value(s)];
         // As many halvings as f64 has digits; Newton takes about five steps.
-        for _ in 0..60 {
-            let excess = self.partial_column(s) - column;
-            if excess > 0.0 {
-                high = s;
-            } else {
-                low = s;
-            }
-            let newton = s - excess / self.value(s);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            if (next - s).abs() <= 1e-12 * self.length {
-                return next;
-            }
-            s = next;
-        }
-        s
+        newton::root(
+            [0.0, self.length],
+            guess,
+            60,
+            |_| 1e-12 * self.length,
+            excess,
+        )
     }
 
     /// The value at distance `s`.
