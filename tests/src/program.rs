@@ -57,6 +57,26 @@ pub fn tyndall() -> &'static Path {
     })
 }
 
+/// As [`run_tyndall`], with arguments separated by single spaces.
+pub fn run_line(folder: &Path, arguments: &str) -> Output {
+    run_tyndall(folder, &arguments.split(' ').collect::<Vec<_>>())
+}
+
+/// As [`run_line`], for a command that must succeed; its standard error.
+///
+/// # Panics
+/// If it does not, with what it said.
+pub fn succeed(folder: &Path, arguments: &str) -> String {
+    let output = run_line(folder, arguments);
+    let stderr = String::from_utf8(output.stderr).expect("tyndall writes UTF-8");
+    assert!(
+        output.status.success(),
+        "tyndall {arguments}: {}\n{stderr}",
+        output.status
+    );
+    stderr
+}
+
 /// Runs `tyndall` with these arguments in `folder`, without a terminal and without colours.
 pub fn run_tyndall<A: AsRef<OsStr>>(folder: &Path, arguments: &[A]) -> Output {
     let mut command = Command::new(tyndall());

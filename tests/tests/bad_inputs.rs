@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use tyndall_tests::image::Image;
-use tyndall_tests::program::run_tyndall;
+use tyndall_tests::program::run_line;
 
 /// A scene that renders; the cases break it.
 const SCENE: &str = r#"Scene(
@@ -70,7 +70,7 @@ const RENDER: &str = "render scene.ron -o out.exr --spp 1 --quiet";
 
 /// Runs `arguments` in `folder`; they must be refused, with the message of the snapshot `name`.
 fn refused(name: &str, folder: &Path, arguments: &str) {
-    let output = run_tyndall(folder, &arguments.split(' ').collect::<Vec<_>>());
+    let output = run_line(folder, arguments);
     let message = String::from_utf8(output.stderr).unwrap();
     let message = message.replace(&folder.display().to_string(), "[folder]");
     assert_eq!(output.status.code(), Some(2), "{name}: {message}");
@@ -99,7 +99,7 @@ fn refused_mesh(name: &str, parent: &str, key: &str, value: Value) {
 #[test]
 fn the_scene_that_the_cases_break_is_good() {
     let folder = good_folder();
-    let output = run_tyndall(folder.path(), &RENDER.split(' ').collect::<Vec<_>>());
+    let output = run_line(folder.path(), RENDER);
     assert!(
         output.status.success(),
         "{}",

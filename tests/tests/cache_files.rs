@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use tyndall_tests::image::Channels;
-use tyndall_tests::program::run_tyndall;
+use tyndall_tests::program::{self, run_line};
 
 /// A box of fog with a wall, lit by a lamp and a sky: records of multiple scattering, of the sky and on surfaces.
 const ROOM: &str = r#"Scene(
@@ -75,16 +75,13 @@ fn folder() -> TempDir {
 
 /// Runs `tyndall` with arguments separated by spaces; returns exit status and standard error.
 fn run(folder: &TempDir, arguments: &str) -> (Option<i32>, String) {
-    let output = run_tyndall(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
-    (
-        output.status.code(),
-        String::from_utf8(output.stderr).unwrap(),
-    )
+    let output = run_line(folder.path(), arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    (output.status.code(), stderr)
 }
 
 fn succeed(folder: &TempDir, arguments: &str) {
-    let (status, stderr) = run(folder, arguments);
-    assert_eq!(status, Some(0), "tyndall {arguments}\n{stderr}");
+    program::succeed(folder.path(), arguments);
 }
 
 fn pixels(folder: &TempDir, name: &str) -> Channels {
@@ -254,7 +251,7 @@ fn filling_that_the_time_limit_ends_is_gone_on_with() {
     let records = |options: &str| {
         let (status, stderr) = run(&folder, &format!("render room.ron --error 0.05 {options}"));
         assert_eq!(status, Some(0), "{stderr}");
-        let output = run_tyndall(folder.path(), &["info", "room.cache", "--json"]);
+        let output = run_line(folder.path(), "info room.cache --json");
         let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         let count = info["records"]["surface"]["count"].as_u64().unwrap_or(0);
         (count, info["views"].as_u64().unwrap())
@@ -330,7 +327,7 @@ fn a_cache_file_tells_what_it_holds() {
         "render room.ron --quiet --cache-out room.cache --fill-only",
     );
     assert!(!Path::new(&folder.path().join("room-render.exr")).exists());
-    let output = run_tyndall(folder.path(), &["info", "room.cache", "--json"]);
+    let output = run_line(folder.path(), "info room.cache --json");
     let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(info["views"], 1);
     assert!(

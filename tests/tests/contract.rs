@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 use tempfile::TempDir;
 use tyndall_tests::image::{Channels, Image};
-use tyndall_tests::program::{run_tyndall, workspace};
+use tyndall_tests::program::{run_line, run_tyndall, succeed, workspace};
 
 /// The scene file of the contract, with numbers where it shows dots.
 const EVERY_FIELD: &str = r#"
@@ -50,18 +50,6 @@ Scene(
 
 const INTEGRATORS: [&str; 2] = ["cache", "path"];
 const METHODS: [&str; 2] = ["tyndall", "jarosz08"];
-
-/// Runs `tyndall` in `folder` with arguments separated by spaces; returns its standard error.
-fn succeed(folder: &Path, arguments: &str) -> String {
-    let output = run_tyndall(folder, &arguments.split(' ').collect::<Vec<_>>());
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        output.status.success(),
-        "tyndall {arguments}: {}\n{stderr}",
-        output.status
-    );
-    stderr
-}
 
 /// Renders the shipped Cornell box, small, into `out.exr` of `folder`; returns its channels.
 fn render_cornell(folder: &Path, options: &str) -> Channels {
@@ -248,7 +236,7 @@ fn the_pixels_do_not_depend_on_the_number_of_threads() {
 fn a_method_is_only_for_caching() {
     let folder = TempDir::new().unwrap();
     let arguments = "render scene.ron --integrator path --method jarosz08";
-    let output = run_tyndall(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    let output = run_line(folder.path(), arguments);
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     assert!(stderr.contains("--method"), "{stderr}");
@@ -390,7 +378,7 @@ fn outputs_never_replace_what_the_scene_is_read_from() {
     for file in ["cornell_box.ron", "cornell_box.gltf", "cornell_box.bin"] {
         let before = fs::read(folder.path().join(file)).unwrap();
         let command = format!("render cornell_box.ron -o out.exr --width 4 --spp 1 --stats {file}");
-        let output = run_tyndall(folder.path(), &command.split(' ').collect::<Vec<_>>());
+        let output = run_line(folder.path(), &command);
         assert_eq!(output.status.code(), Some(2), "{file}");
         assert_eq!(fs::read(folder.path().join(file)).unwrap(), before);
     }
