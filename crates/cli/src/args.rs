@@ -177,7 +177,7 @@ pub(crate) struct CompareArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct InfoArgs {
-    /// Scene (.ron, .glb, .gltf), image (.exr, .png, .hdr, .jpg) or cache file.
+    /// Scene (.ron, .glb, .gltf), volume (.vdb, .vol), image (.exr, .png, .hdr, .jpg) or cache file.
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) source: SourceArgs,

@@ -7,7 +7,7 @@ use crate::error::RenderError;
 use crate::film::Film;
 use crate::layers::LayerSet;
 use crate::options::Crop;
-use crate::relative::{median_5x5, weighted};
+use crate::relative::{floor, median_5x5, weight, weighted};
 use tyndall_math::{Key, Sampler};
 
 /// Blocks are this many pixels wide and high, counted from the frame's corner; those at its far borders may be smaller.
@@ -64,14 +64,11 @@ impl Region {
     }
 
     /// What the variance of one sample adds to the squared relative error: the mean over pixels and channels of a block, which is counted
-    /// from the region's corner. `floor` is the 0.01 mean² of the weights.
+    /// from the region's corner. `floor` is that of the weights.
     fn sample_variance(&self, block: Crop, floor: f64) -> f64 {
         let pixel = |i: usize| {
             let variance = self.film.sample_variance(i);
-            let channel = |c: usize| {
-                let r = f64::from(self.smooth[c][i]);
-                weighted(variance[c], 1.0 / (r * r + floor))
-            };
+            let channel = |c: usize| weighted(variance[c], weight(self.smooth[c][i], floor));
             (0..3).map(channel).sum::<f64>() / 3.0
         };
         let n = f64::from(block.width * block.height);
@@ -110,7 +107,7 @@ impl Region {
 pub(crate) struct Rule {
     /// Samples over the root of what one sample's variance adds to the squared error.
     scale: f64,
-    /// What keeps weights of dark pixels finite: 0.01 of the squared mean.
+    /// That of the weights.
     floor: f64,
 }
 
@@ -121,7 +118,7 @@ impl Rule {
     pub(crate) fn new(pilot: &[Region], target: f64) -> (Self, f64) {
         let n: f64 = pilot.iter().map(|region| region.film.len() as f64).sum();
         let mean = pilot.iter().map(|region| region.light).sum::<f64>() / (3.0 * n);
-        let floor = 0.01 * mean * mean;
+        let floor = floor(mean);
         let (mut roots, mut squared) = (0.0, 0.0);
         for region in pilot {
             for block in region.blocks() {

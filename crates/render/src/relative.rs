@@ -10,12 +10,21 @@ use rayon::prelude::*;
 /// in their medians. f64, since r² leaves the range of f32 for radiances beyond 10^±19. A black reference has infinite
 /// weights: see [`weighted`].
 pub fn weights(smooth: &[Vec<f32>], mean: f64) -> Vec<Vec<f64>> {
-    let floor = 0.01 * mean.powi(2);
-    let weight = |r: &f32| 1.0 / (f64::from(*r).powi(2) + floor);
+    let floor = floor(mean);
     smooth
         .iter()
-        .map(|channel| channel.iter().map(weight).collect())
+        .map(|channel| channel.iter().map(|&r| weight(r, floor)).collect())
         .collect()
+}
+
+/// What keeps weights of dark pixels finite, for a reference of this mean: 0.01 mean².
+pub(crate) fn floor(mean: f64) -> f64 {
+    0.01 * mean.powi(2)
+}
+
+/// The weight of one value `r` of the smooth reference.
+pub(crate) fn weight(r: f32, floor: f64) -> f64 {
+    1.0 / (f64::from(r).powi(2) + floor)
 }
 
 /// Mean over all pixels and channels.

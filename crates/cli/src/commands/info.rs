@@ -3,6 +3,7 @@
 use crate::args::InfoArgs;
 use crate::error::CliError;
 use crate::output;
+use serde::Serialize;
 use tyndall_render::CacheInfo;
 use tyndall_render::image_file::read_image;
 use tyndall_render::info::{ImageInfo, LightInfo, SceneInfo, VolumeInfo};
@@ -20,12 +21,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
         .to_string_lossy()
         .to_ascii_lowercase();
     if CacheInfo::is_cache(&args.file) {
-        let cache = CacheInfo::of(&args.file)?;
-        return if args.json {
-            output::print_json(&cache)
-        } else {
-            output::print(&cache_text(&cache))
-        };
+        return show(args, &CacheInfo::of(&args.file)?, cache_text);
     }
     match ending.as_str() {
         "ron" | "glb" | "gltf" => {
@@ -33,33 +29,39 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), CliError> {
                 bare_gltf: true,
                 ..args.source.load_options()
             };
-            let scene = SceneInfo::of(&tyndall_scene::load(&args.file, &options)?);
-            if args.json {
-                output::print_json(&scene)
-            } else {
-                output::print(&scene_text(&scene))
-            }
+            show(
+                args,
+                &SceneInfo::of(&tyndall_scene::load(&args.file, &options)?),
+                scene_text,
+            )
         }
         "exr" | "png" | "hdr" | "jpg" | "jpeg" => {
-            let image = ImageInfo::of(&read_image(&args.file)?);
-            if args.json {
-                output::print_json(&image)
-            } else {
-                output::print(&image_text(&image))
-            }
+            show(args, &ImageInfo::of(&read_image(&args.file)?), image_text)
         }
         "vdb" | "nvdb" | "vol" => {
             let limit = args.source.max_grid_memory.unwrap_or(DEFAULT_MEMORY);
-            let volume = VolumeInfo::of(&volume_file::inspect(&args.file, limit)?);
-            if args.json {
-                output::print_json(&volume)
-            } else {
-                output::print(&volume_text(&volume))
-            }
+            show(
+                args,
+                &VolumeInfo::of(&volume_file::inspect(&args.file, limit)?),
+                volume_text,
+            )
         }
         _ => Err(CliError::UnknownKind {
             path: args.file.display().to_string(),
         }),
+    }
+}
+
+/// Prints what was found out, as JSON or as text.
+fn show<T: Serialize>(
+    args: &InfoArgs,
+    info: &T,
+    text: impl Fn(&T) -> String,
+) -> Result<(), CliError> {
+    if args.json {
+        output::print_json(info)
+    } else {
+        output::print(&text(info))
     }
 }
 

@@ -11,7 +11,6 @@ use crate::error::RenderError;
 use crate::layers::LayerSet;
 use crate::stats::Stats;
 use std::time::Instant;
-use tyndall_transport::path::Reach;
 
 /// Least and greatest share of the target error that noise may take where the field or records are read; the rest is left to these. The
 /// least, where their error is not known.
@@ -42,10 +41,7 @@ impl Frame<'_> {
             view: self.view,
             seed: self.seed,
             known: prepared.known(run.way),
-            reach: Reach {
-                max_depth: run.max_depth,
-                field: prepared.field.as_ref().map(|filled| &filled.field),
-            },
+            reach: run.reach(prepared.field.as_ref()),
         };
         let (mut film, tally, timed_out) = sampling.run(&layers, self.noise_target())?;
         stats.error_shares.extend(prepared.known_shares());

@@ -242,11 +242,7 @@ impl Run<'_> {
         let Some(plan) = prepared.plan else {
             return prepared;
         };
-        let field = prepared.field.as_ref().map(|filled| &filled.field);
-        let reach = Reach {
-            max_depth: self.max_depth,
-            field,
-        };
+        let reach = self.reach(prepared.field.as_ref());
         if let Some(filled) = prepared.multiple.take() {
             let kind = self.media(views, Holds::Multiple(reach), plan.multiple);
             prepared.multiple = Some(self.fill(views, kind, Some(filled)));
@@ -286,7 +282,7 @@ impl Run<'_> {
     }
 
     /// How far paths go that may end in a field.
-    fn reach<'f>(&self, field: Option<&'f FilledField>) -> Reach<'f> {
+    pub(super) fn reach<'f>(&self, field: Option<&'f FilledField>) -> Reach<'f> {
         Reach {
             max_depth: self.max_depth,
             field: field.map(|filled| &filled.field),
