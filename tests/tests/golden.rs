@@ -13,12 +13,14 @@ use tyndall_tests::golden::Goldens;
 use tyndall_tests::image::Image;
 use tyndall_tests::program::workspace;
 
-/// Shipped scenes and the sizes of their thumbnails.
-const SCENES: [(&str, [u32; 2]); 4] = [
-    ("cornell_box", [32, 32]),
-    ("lamp", [32, 24]),
-    ("hall", [40, 30]),
-    ("street", [40, 30]),
+/// Shipped scenes: folder, name and the size of the thumbnail.
+const SCENES: [(&str, &str, [u32; 2]); 6] = [
+    ("cornell_box", "cornell_box", [32, 32]),
+    ("cornell_box", "cornell_box_forward", [32, 32]),
+    ("cornell_box", "cornell_box_backward", [32, 32]),
+    ("lamp", "lamp", [32, 24]),
+    ("hall", "hall", [40, 30]),
+    ("street", "street", [40, 30]),
 ];
 
 /// The integrators and their samples per pixel, which keep every golden under a few seconds.
@@ -26,7 +28,7 @@ const INTEGRATORS: [(Integrator, u32); 2] = [(Integrator::Cache, 4), (Integrator
 
 fn main() {
     let mut trials = Vec::new();
-    for (scene, size) in SCENES {
+    for (folder, scene, size) in SCENES {
         for (integrator, spp) in INTEGRATORS {
             let name = format!("{scene}_{}", integrator.name());
             let options = RenderOptions {
@@ -40,20 +42,21 @@ fn main() {
                 ..RenderOptions::default()
             };
             trials.push(Trial::test(name.clone(), move || {
-                check(&name, scene, &options).map_err(|error| Failed::from(format!("{error:#}")))
+                check(&name, (folder, scene), &options)
+                    .map_err(|error| Failed::from(format!("{error:#}")))
             }));
         }
     }
     libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }
 
-fn check(name: &str, scene: &str, options: &RenderOptions) -> Result<()> {
+fn check(name: &str, (folder, scene): (&str, &str), options: &RenderOptions) -> Result<()> {
     let goldens = Goldens {
         references: workspace().join("tests/golden"),
         failures: workspace().join("target/golden-failures"),
         bless: env::var_os("TYNDALL_BLESS").is_some(),
     };
-    let path = workspace().join(format!("assets/{scene}/{scene}.ron"));
+    let path = workspace().join(format!("assets/{folder}/{scene}.ron"));
     let scene = tyndall_scene::load(&path, &LoadOptions::default())?;
     let image = tyndall_render::render(&scene, options, &())?.image;
     let beauty = image.layer("beauty").context("an image without beauty")?;

@@ -13,7 +13,7 @@ pub(crate) const MAX_EXTRAPOLATION: f32 = 0.7;
 ///
 /// w = 3s² − 2s³: C¹, 1 at the record, 0 with slope 0 at the rim, so that nothing pops where a ball ends.
 #[inline]
-pub(crate) fn weight(s: f32) -> f32 {
+pub fn weight(s: f32) -> f32 {
     s * s * (3.0 - 2.0 * s)
 }
 

@@ -125,7 +125,11 @@ impl<const N: usize, T: Clone> Cache<N, T> {
 
     /// As [`Cache::lookup`], from those records alone that are `valid` by their tag and the offset (p − x)/R from the record.
     #[inline]
-    pub fn lookup_where(&self, p: Vec3, valid: impl Fn(&T, Vec3) -> bool) -> Option<[f32; N]> {
+    pub fn lookup_where(
+        &self,
+        p: Vec3,
+        mut valid: impl FnMut(&T, Vec3) -> bool,
+    ) -> Option<[f32; N]> {
         let mut blend = Blend::EMPTY;
         self.octree.for_each_holding(p, |slot, offset| {
             if valid(&self.slot_tags[slot], offset) {

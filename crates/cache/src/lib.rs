@@ -72,6 +72,7 @@ mod record;
 mod segment;
 mod shape;
 
+pub use blend::weight;
 pub use cache::Cache;
 pub use crossings::{Crossing, Crossings};
 pub use error::{CacheError, Field};

@@ -129,6 +129,13 @@ impl Media {
             .all(|m| m.is_vacuum() || m.sigma_s() == Vec3::ZERO || m.phase().is_isotropic())
     }
 
+    /// The largest absolute value of the Legendre moment `χ_l` of any medium that scatters; 0 without one.
+    pub fn largest_moment(&self, l: usize) -> f32 {
+        let scatters = |m: &&Medium| m.sigma_s() != Vec3::ZERO;
+        let moments = self.matter().filter(scatters).map(|m| m.phase().moments(l));
+        moments.fold(0.0, |largest, moment| largest.max(moment.abs()))
+    }
+
     /// Whether any medium emits light.
     pub fn emits(&self) -> bool {
         self.matter().any(|m| m.emission() != Vec3::ZERO)

@@ -114,6 +114,21 @@ impl<'a> MediumPoint<'a> {
         }
     }
 
+    /// The Legendre moment `χ_l` of the phase functions mixed by scattering, channel by channel: the factor by which scattering scales
+    /// band l of spherical harmonics. 0 where a channel does not scatter and l > 0.
+    pub fn moments(&self, l: usize) -> Vec3 {
+        if l == 0 {
+            return Vec3::ONE;
+        }
+        let scattered = |lobe: &Lobe<'_>| {
+            let medium = lobe.medium;
+            medium.sigma_s() * (lobe.density * medium.phase().moments(l))
+        };
+        let sum: Vec3 = self.lobes.iter().map(scattered).sum();
+        let scatters = self.sigma_s.cmpgt(Vec3::ZERO);
+        Vec3::select(scatters, sum / self.sigma_s, Vec3::ZERO)
+    }
+
     /// Whether media of different phase functions meet: with one alone the derivatives of shares cancel, but not to the last digit.
     fn mixes(&self) -> bool {
         self.lobes

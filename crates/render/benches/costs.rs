@@ -95,7 +95,7 @@ fn field(scene: &Scene) -> Field {
         let [x, y] = u.next_2d();
         Filling::walk(&world, scene.camera.ray(x, y, 1, 1), &mut u, &mut found);
     }
-    Field::new(world.geometry, widths, &found)
+    Field::new(world.geometry, world.media, widths, &found)
 }
 
 fn sponza(criterion: &mut Criterion) {

@@ -4,6 +4,7 @@
 //! emitters is left out, because single scattering is computed where it is needed.
 
 use crate::lamp_directions::LampDirections;
+use crate::lobe::{self, n_above};
 use crate::occlusion::{self, Seen};
 use crate::path::{
     FirstEvent, Reach, Source, Start, Vertex, Visitor, lamps_in_fog, straight_from_sky, trace,
@@ -49,6 +50,28 @@ pub struct Gathered {
     pub walls: Walls,
 }
 
+/// Where light goes from the point at which it is gathered.
+#[derive(Clone, Copy, Debug)]
+pub enum Towards {
+    /// In this unit direction, wherever the point moves.
+    Direction(Vec3),
+    /// To an eye at this place: the direction turns when the point moves.
+    Eye(Vec3),
+}
+
+impl Towards {
+    /// The unit direction from `x`, and how fast it turns when `x` moves: `∂w_o = (1 − w_o w_oᵀ) rate`.
+    fn from(self, x: Vec3) -> (Vec3, f32) {
+        match self {
+            Self::Direction(w_o) => (w_o, 0.0),
+            Self::Eye(eye) => {
+                let (w_o, distance) = (eye - x).normalize_and_length();
+                (w_o, -1.0 / distance.max(f32::MIN_POSITIVE))
+            }
+        }
+    }
+}
+
 /// Directions in which light is gathered at a point: by the phase function there, and close to lamps.
 #[derive(Clone, Debug)]
 pub struct GatherDirections<'m> {
@@ -77,6 +100,23 @@ impl<'m> GatherDirections<'m> {
         Self {
             lamps,
             lobe: towards.filter(|_| matters).map(|w_o| (w_o, medium)),
+        }
+    }
+
+    /// As [`GatherDirections::new`]; light straight from skies is not looked for past lamps.
+    fn of<G, L: Lights>(
+        world: &World<'m, G, L>,
+        x: Vec3,
+        towards: Option<Vec3>,
+        what: What<'_>,
+    ) -> Self {
+        let directions = Self::new(world, x, towards);
+        match what {
+            What::Scattered(_) => directions,
+            What::Sky => Self {
+                lamps: LampDirections::default(),
+                ..directions
+            },
         }
     }
 
@@ -247,56 +287,82 @@ pub fn multiple<G: Geometry, L: Lights>(
     multiple_towards(world, x, None, pattern, Derivatives::Aware, reach, key)
 }
 
-/// As [`multiple`], with directions weighted by the phase function at `x` for light that leaves `towards` the eye, and a choice of
+/// As [`multiple`], with directions weighted by the phase function at `x` for light that leaves `towards` somewhere, and a choice of
 /// `derivatives`.
 ///
 /// Value and gradient are those of ∫ p L dω with p the media's phase functions mixed by scattering.
 pub fn multiple_towards<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     x: Vec3,
-    towards: Option<Vec3>,
+    towards: Option<Towards>,
     pattern: &GatherPattern,
     derivatives: Derivatives,
     reach: Reach<'_>,
     key: Key,
 ) -> Gathered {
-    let directions = GatherDirections::new(world, x, towards);
+    let leaving = towards.map(|towards| towards.from(x));
+    let directions = GatherDirections::new(world, x, leaving.map(|(w_o, _)| w_o));
+    let from = (x, directions, leaving.map_or(0.0, |(_, rate)| rate));
     let what = What::Scattered(reach);
-    gather(world, x, directions, pattern, derivatives, what, key)
-}
-
-/// Gathers light at `x` that comes straight from skies and environment images, along `pattern`; weights all directions alike.
-pub fn sky<G: Geometry, L: Lights>(
-    world: &World<'_, G, L>,
-    x: Vec3,
-    pattern: &GatherPattern,
-    key: Key,
-) -> Gathered {
-    let directions = GatherDirections {
-        lamps: LampDirections::default(),
-        lobe: None,
-    };
-    let aware = Derivatives::Aware;
-    gather(world, x, directions, pattern, aware, What::Sky, key)
+    gather(world, from, pattern, derivatives, what, key, |_, _| {})
 }
 
 /// Which light is gathered.
 #[derive(Clone, Copy, Debug)]
-enum What<'f> {
+pub enum What<'f> {
     /// Light scattered or reflected before, along paths that go so far.
     Scattered(Reach<'f>),
     /// Light straight from skies and environment images.
     Sky,
 }
 
+/// Gathers light at `x` alike from all directions along `pattern`, and its directions: coefficients of bands 1 to `order` of spherical
+/// harmonics, radiance over 4π; see [`crate::lobe`].
+pub fn incident<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    what: What<'_>,
+    order: usize,
+    pattern: &GatherPattern,
+    key: Key,
+) -> (Gathered, Vec<Vec3>) {
+    let from = (x, GatherDirections::of(world, x, None, what), 0.0);
+    let mut bands = vec![Vec3::ZERO; n_above(order)];
+    let aware = Derivatives::Aware;
+    let found = gather(world, from, pattern, aware, what, key, |w_i, light| {
+        lobe::add(order, &mut bands, w_i, light);
+    });
+    for c in &mut bands {
+        *c /= pattern.n_rays() as f32;
+    }
+    (found, bands)
+}
+
+/// Gathers light at `x` along `pattern` as it leaves `towards` somewhere; see [`multiple_towards`].
+pub fn towards<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    towards: Option<Towards>,
+    what: What<'_>,
+    pattern: &GatherPattern,
+    key: Key,
+) -> Gathered {
+    let leaving = towards.map(|towards| towards.from(x));
+    let directions = GatherDirections::of(world, x, leaving.map(|(w_o, _)| w_o), what);
+    let from = (x, directions, leaving.map_or(0.0, |(_, rate)| rate));
+    let aware = Derivatives::Aware;
+    gather(world, from, pattern, aware, what, key, |_, _| {})
+}
+
+/// Gathers light, and lets `see` each direction with what comes from there, whose mean over all rays is the value.
 fn gather<'m, G: Geometry, L: Lights>(
     world: &World<'m, G, L>,
-    x: Vec3,
-    directions: GatherDirections<'m>,
+    (x, directions, rate): (Vec3, GatherDirections<'m>, f32),
     pattern: &GatherPattern,
     derivatives: Derivatives,
     what: What<'_>,
     key: Key,
+    mut see: impl FnMut(Vec3, Vec3),
 ) -> Gathered {
     let share = directions.lamps.share();
     let eighths = ((LAMP_EIGHTHS as f32 * share).ceil() as usize).min(LAMP_LEVELS - 1);
@@ -346,7 +412,7 @@ fn gather<'m, G: Geometry, L: Lights>(
     let nearest = distances().map(|(t, _)| t).fold(f32::INFINITY, f32::min);
     let inverse: f32 = distances().map(|(t, weight)| weight / t).sum();
     let radius = warp_radius(world, x, nearest);
-    let w_o = directions.lobe.as_ref().map(|(w_o, _)| *w_o);
+    let leaving = directions.lobe.as_ref().map(|(w_o, _)| (*w_o, rate));
     // Without surfaces nothing hides anything.
     let aware = derivatives == Derivatives::Aware && nearest.is_finite();
 
@@ -354,12 +420,13 @@ fn gather<'m, G: Geometry, L: Lights>(
     let mut seen = Vec::with_capacity(set.directions.len());
     for (batch, starts) in starts.chunks(pattern.paths).enumerate() {
         for (i, (start, direction)) in starts.iter().enumerate() {
-            let mut visitor = WarpVisitor::new(world.media, x, radius, w_o);
+            let mut visitor = WarpVisitor::new(world.media, x, radius, leaving);
             match what {
                 What::Scattered(_) => trace(world, start, &mut sampler(batch, i), &mut visitor),
                 What::Sky => straight_from_sky(world, start, visitor.straight()),
             }
             let weight = direction.weight;
+            see(direction.w_i, visitor.value * weight);
             let [dr, dg, db] = visitor.gradient;
             batches.add(
                 batch,

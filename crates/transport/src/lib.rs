@@ -90,6 +90,7 @@ pub mod lamp_directions;
 pub mod layers;
 pub mod light_choice;
 pub mod light_tree;
+pub mod lobe;
 mod occlusion;
 pub mod path;
 mod segment_warp;

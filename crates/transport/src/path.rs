@@ -31,6 +31,10 @@ const LONG_PATH: u32 = 128;
 const LAMP_SHARE_MEDIUM: f32 = 0.5;
 const LAMP_SHARE_SURFACE: f32 = 0.25;
 
+/// A field is read where scatterings leave less than this of the first band of directions that it does not hold. Cornell box with g = 0.7
+/// and light from above: `multiple` 4.4 % too bright with 0.06, 1.5 % with 0.004, and no better with 0.0005 (2026-11-23).
+const SHARPNESS: f32 = 0.004;
+
 /// Where a path scattered.
 #[derive(Clone, Copy, Debug)]
 pub enum Vertex<'v, 'm> {
@@ -171,6 +175,9 @@ pub fn trace<'m, G: Geometry, L: Lights>(
     let mut events = 0;
     // Whether the last scattering blurs what lies beyond it, so that cells of light do not show; and whether a field was too coarse once.
     let (mut blurred, mut refused) = (true, false);
+    // How much the scatterings so far leave of the finest directions that the field does not hold: paths start behind one.
+    let unheld = start.reach.field.map_or(0.0, Field::unheld);
+    let mut sharpness = unheld;
     let may_scatter = |events: u32| start.reach.max_depth.is_none_or(|max| events < max);
 
     loop {
@@ -191,7 +198,10 @@ pub fn trace<'m, G: Geometry, L: Lights>(
         }
 
         if let (Some(field), FirstEvent::Any, None) = (
-            start.reach.field.filter(|_| blurred),
+            start
+                .reach
+                .field
+                .filter(|_| blurred && sharpness * unheld <= SHARPNESS),
             first,
             start.reach.max_depth,
         ) {
@@ -253,6 +263,7 @@ pub fn trace<'m, G: Geometry, L: Lights>(
                     pdf,
                 });
                 blurred = true;
+                sharpness *= unheld;
                 ray = Ray::new(x, w_i);
             }
             (None, Some(hit)) => {
@@ -286,6 +297,9 @@ pub fn trace<'m, G: Geometry, L: Lights>(
                 throughput *= hit.bsdf.eval(w_o, w_i) / pdf;
                 rival = Rival::Surface { choice, pdf };
                 blurred = !hit.bsdf.is_shiny();
+                if blurred {
+                    sharpness = 0.0;
+                }
                 ray = hit.spawn(w_i);
             }
             (None, None) => return,

@@ -6,7 +6,7 @@
 //! ∇∫f = ∫ f [ Σ over segments ∂ ln(T G) + Σ over vertices (α ∂ ln σs + ∂α) ],  α(y) = (1 − ρ²/D²)² for ρ = |y − x| < D, else 0.
 //!
 //! Where scattering is not isotropic the directions at a vertex turn when its neighbours move otherwise than itself, and
-//! ∂ ln p(μ) joins the sum; towards the eye the direction stays.
+//! ∂ ln p(μ) joins the sum; towards the eye the direction stays, or turns about the eye.
 //!
 //! Left out, so that gradients miss them: moving shadows (visibility is taken as constant; what hides from
 //! the gather point itself is added by [`crate::occlusion`]), boundaries of media nearer than the
@@ -69,9 +69,14 @@ pub(crate) struct WarpVisitor<'m> {
 pub(crate) type Arrivals = SmallVec<[(f32, Vec3); 3]>;
 
 impl<'m> WarpVisitor<'m> {
-    /// For paths that start at `center`; `radius` is the D of the displacement field. The light leaves in the direction
-    /// `towards`, or is weighted alike for all directions.
-    pub(crate) fn new(media: &'m Media, center: Vec3, radius: f32, towards: Option<Vec3>) -> Self {
+    /// For paths that start at `center`; `radius` is the D of the displacement field. The light is `leaving` in a direction that turns
+    /// at a rate, `∂w_o = (1 − w_o w_oᵀ) rate`, or is weighted alike for all directions.
+    pub(crate) fn new(
+        media: &'m Media,
+        center: Vec3,
+        radius: f32,
+        leaving: Option<(Vec3, f32)>,
+    ) -> Self {
         Self {
             media,
             center,
@@ -81,7 +86,7 @@ impl<'m> WarpVisitor<'m> {
                 alpha: 1.0,
                 normal: None,
             },
-            leaving: towards.map(|w_o| Leaving { w_o, rate: 0.0 }),
+            leaving: leaving.map(|(w_o, rate)| Leaving { w_o, rate }),
             lobes: !media.is_isotropic(),
             straight: false,
             first: None,

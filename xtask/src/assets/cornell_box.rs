@@ -75,9 +75,22 @@ pub(super) fn asset() -> Asset {
 
     Asset {
         name: "cornell_box",
-        ron: RON,
+        ron: RON.to_owned(),
         gltf: Some(document),
+        variants: vec![
+            ("cornell_box_forward", scattering(0.7)),
+            ("cornell_box_backward", scattering(-0.4)),
+        ],
     }
+}
+
+/// The scene with fog of mean cosine `g`.
+fn scattering(g: f32) -> String {
+    let albedo = "albedo: (0.6666667, 0.6666667, 0.6666667),\n";
+    let phase = format!("{albedo}            phase: HenyeyGreenstein(g: {g}),\n");
+    let kind = if g > 0.0 { "forward" } else { "backward" };
+    RON.replace("isotropic fog", &format!("fog that scatters {kind}"))
+        .replace(albedo, &phase)
 }
 
 /// A point of the original plan (x to the left, z away from the camera, millimetres) at height `y` in metres.

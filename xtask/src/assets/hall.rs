@@ -61,8 +61,9 @@ pub(super) fn asset() -> Asset {
     document.part("carpet", &carpet, cloth);
     Asset {
         name: "hall",
-        ron: RON,
+        ron: RON.to_owned(),
         gltf: Some(document),
+        variants: Vec::new(),
     }
 }
 

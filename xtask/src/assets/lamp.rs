@@ -22,7 +22,8 @@ Scene(
 pub(super) fn asset() -> Asset {
     Asset {
         name: "lamp",
-        ron: RON,
+        ron: RON.to_owned(),
         gltf: None,
+        variants: Vec::new(),
     }
 }

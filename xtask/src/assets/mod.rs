@@ -17,8 +17,10 @@ use std::path::PathBuf;
 /// One scene: `assets/<name>/<name>.ron`, with its glTF beside it where it has geometry.
 struct Asset {
     name: &'static str,
-    ron: &'static str,
+    ron: String,
     gltf: Option<Document>,
+    /// Further scene files of the same geometry, `assets/<name>/<variant>.ron`.
+    variants: Vec<(&'static str, String)>,
 }
 
 pub(crate) fn run() -> Result<()> {
@@ -42,6 +44,12 @@ fn files() -> Result<Vec<(PathBuf, Vec<u8>)>> {
     ] {
         let stem = PathBuf::from("assets").join(asset.name).join(asset.name);
         files.push((stem.with_extension("ron"), asset.ron.into()));
+        for (variant, ron) in asset.variants {
+            files.push((
+                stem.with_file_name(variant).with_extension("ron"),
+                ron.into(),
+            ));
+        }
         if let Some(document) = asset.gltf {
             let bin = format!("{}.bin", asset.name);
             files.push((stem.with_extension("gltf"), document.json(&bin)?));

@@ -19,6 +19,7 @@ Scene(
             region: Box(min: (-25.0, -0.5, -140.0), max: (25.0, 14.0, 20.0)),
             sigma_t: (0.03, 0.03, 0.03),
             albedo: (0.95, 0.95, 0.95),
+            phase: HenyeyGreenstein(g: 0.5),
         ),
     ],
 )
@@ -45,8 +46,9 @@ pub(super) fn asset() -> Asset {
     car(&mut document);
     Asset {
         name: "street",
-        ron: RON,
+        ron: RON.to_owned(),
         gltf: Some(document),
+        variants: Vec::new(),
     }
 }
 

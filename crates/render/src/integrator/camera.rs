@@ -4,18 +4,17 @@
 //! surfaces from records; each scene pays only for what it holds.
 
 use super::counted::Counted;
-use super::fill::media::{self, MediaCache};
+use super::fill::media::{self, For, MediaCache};
 use super::fill::surfaces::{self, SurfaceCache};
 use super::view::View;
 use crate::film::Pixel;
 use glam::Vec3;
 use std::cell::Cell;
-use std::f32::consts::FRAC_1_PI;
 use tyndall_math::{Ray, Sampler};
 use tyndall_scene::{LightSet, Scene};
-use tyndall_transport::field::{Field, Part};
+use tyndall_transport::field::Field;
 use tyndall_transport::free_flight::FreeFlight;
-use tyndall_transport::gather;
+use tyndall_transport::gather::{self, GatherDirections};
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
 use tyndall_transport::shafts::Shafts;
@@ -39,7 +38,6 @@ const MAKESHIFT: f32 = 0.05;
 const LEAST_GLOSS: f32 = 0.25;
 /// Parts of a camera sample's work beside the path behind the first surface; each has numbers of its own.
 const FOG_PART: u64 = 16;
-const PATHS_PART: u64 = 17;
 const SKY_PART: u64 = 18;
 const GLOSS_PART: u64 = 19;
 const SINGLE_PART: u64 = 20;
@@ -57,7 +55,7 @@ pub(crate) enum Multiple<'c> {
     Records(&'c MediaCache),
     /// Read from the coarse field.
     Field(&'c Field),
-    /// Path traced.
+    /// Traced from each place that is asked for.
     Paths,
 }
 
@@ -68,6 +66,8 @@ pub(crate) struct Known<'c> {
     pub(crate) sky: Option<&'c MediaCache>,
     /// Single scattering of all light, where records hold it.
     pub(crate) single: Option<&'c MediaCache>,
+    /// For whom records of light in media are.
+    pub(crate) for_whom: For,
     /// Light on surfaces, where records hold it: indirect, and where there are records of light from skies that, too.
     pub(crate) indirect: Option<&'c SurfaceCache>,
 }
@@ -173,7 +173,7 @@ impl<'s> Camera<'s> {
         if flight.segment().is_empty() {
             return pixel;
         }
-        let mut paths = sampler.branch(PATHS_PART);
+        let w_o = -ray.direction;
         let sampler = &mut sampler.branch(FOG_PART);
         if let Some(e) = emission::sample(&world, &ray, &flight, sampler.next_1d()) {
             pixel.emission = e.value;
@@ -188,20 +188,24 @@ impl<'s> Camera<'s> {
             match known.multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    let trace = |x, path: &mut Sampler| gather::one(&world, x, self.reach, path);
-                    pixel.multiple = self.interpolated(&ray, &flight, cache, sampler, trace);
+                    let trace = |x, path: &mut Sampler| self.gathered(&world, (x, w_o), path);
+                    pixel.multiple =
+                        self.interpolated((&ray, &flight), (cache, known.for_whom), sampler, trace);
                 }
                 Multiple::Field(field) => {
                     let read = |x, _, path: &mut Sampler| {
-                        let known = field.medium(world.geometry, x, Part::Indirect);
-                        known.map_or_else(|| gather::one(&world, x, self.reach, path), |l| l.value)
+                        let medium = world.media.at(x);
+                        let known = field.leaving(world.geometry, (x, &medium), w_o);
+                        known.map_or_else(
+                            || self.gathered(&world, (x, w_o), path),
+                            |light| light.value.max(Vec3::ZERO),
+                        )
                     };
                     pixel.multiple = self.scattered(&ray, &flight, sampler, read);
                 }
                 Multiple::Paths => {
-                    pixel.multiple = self
-                        .traced(&ray, hit, FirstEvent::Medium, &mut paths)
-                        .multiple;
+                    let read = |x, _, path: &mut Sampler| self.gathered(&world, (x, w_o), path);
+                    pixel.multiple = self.scattered(&ray, &flight, sampler, read);
                 }
             }
         }
@@ -220,7 +224,7 @@ impl<'s> Camera<'s> {
             return Vec3::ZERO;
         }
         let sampler = &mut sampler.branch(FOG_PART);
-        let read = |x, _, sampler: &mut Sampler| from_sky(&world, x, sampler);
+        let read = |x, _, sampler: &mut Sampler| from_sky(&world, (x, -ray.direction), sampler);
         self.scattered(&ray, &flight, sampler, read)
     }
 
@@ -291,6 +295,17 @@ impl<'s> Camera<'s> {
             })
     }
 
+    /// In-scattered radiance at `x` towards `w_o` of light scattered before, by one path.
+    fn gathered(
+        &self,
+        world: &World<'_, Counted<'_>, LightSet>,
+        (x, w_o): (Vec3, Vec3),
+        path: &mut Sampler,
+    ) -> Vec3 {
+        let directions = GatherDirections::new(world, x, Some(w_o));
+        gather::one_of(&directions, world, x, self.reach, path)
+    }
+
     fn traced(
         &self,
         ray: &Ray,
@@ -324,8 +339,9 @@ impl<'s> Camera<'s> {
     ) -> Vec3 {
         if let Some(cache) = known.single {
             let sampler = &mut sampler.branch(SINGLE_PART);
-            let trace = |x, sampler: &mut Sampler| from_lights(world, x, sampler);
-            return self.interpolated(ray, flight, cache, sampler, trace);
+            let trace = |x, sampler: &mut Sampler| from_lights(world, (x, -ray.direction), sampler);
+            let cache = (cache, known.for_whom);
+            return self.interpolated((ray, flight), cache, sampler, trace);
         }
         let Some(mut lights) = SegmentLight::new(world, ray, flight) else {
             return Vec3::ZERO;
@@ -334,8 +350,9 @@ impl<'s> Camera<'s> {
         if let Some(cache) = known.sky {
             lights.take_sky(world.lights);
             let sampler = &mut sampler.branch(SKY_PART);
-            let trace = |x, sampler: &mut Sampler| from_sky(world, x, sampler);
-            shafts += self.interpolated(ray, flight, cache, sampler, trace);
+            let trace = |x, sampler: &mut Sampler| from_sky(world, (x, -ray.direction), sampler);
+            let cache = (cache, known.for_whom);
+            shafts += self.interpolated((ray, flight), cache, sampler, trace);
         }
         for (light, probes) in lights.take_shafts(world.lights, SHAFT_PROBES) {
             let shaft = Shafts::new(world, ray, flight, light);
@@ -384,32 +401,45 @@ impl<'s> Camera<'s> {
     /// As [`Camera::scattered`], of what `cache` knows; at a place where it knows nothing, of what `trace` finds.
     fn interpolated(
         &self,
-        ray: &Ray,
-        flight: &FreeFlight<'_>,
-        cache: &MediaCache,
+        (ray, flight): (&Ray, &FreeFlight<'_>),
+        (cache, for_whom): (&MediaCache, For),
         sampler: &mut Sampler,
         trace: impl Fn(Vec3, &mut Sampler) -> Vec3,
     ) -> Vec3 {
         self.scattered(ray, flight, sampler, |x, t, sampler| {
             self.lookups.set(self.lookups.get() + 1);
-            media::lookup(cache, x).unwrap_or_else(|| {
+            let lobe = for_whom.lobe(&self.scene.media.at(x), -ray.direction);
+            media::lookup(cache, x, lobe.as_ref()).unwrap_or_else(|| {
                 self.missed.set(self.missed.get() + 1);
                 // The nearest record is a little off here, and a path would be noisy.
-                media::nearest(cache, x, MAKESHIFT * t).unwrap_or_else(|| trace(x, sampler))
+                media::nearest(cache, x, lobe.as_ref(), MAKESHIFT * t)
+                    .unwrap_or_else(|| trace(x, sampler))
             })
         })
     }
 }
 
-/// In-scattered radiance at `x` of light straight from all lights, where media scatter alike in all directions.
-fn from_lights(world: &World<'_, Counted<'_>, LightSet>, x: Vec3, sampler: &mut Sampler) -> Vec3 {
+/// In-scattered radiance at `x` towards `w_o` of light straight from all lights.
+fn from_lights(
+    world: &World<'_, Counted<'_>, LightSet>,
+    (x, w_o): (Vec3, Vec3),
+    sampler: &mut Sampler,
+) -> Vec3 {
     let (choice, u) = (sampler.next_1d(), sampler.next_2d());
+    let medium = world.media.at(x);
     let sample = direct::sample(world, x, None, choice, u);
-    sample.map_or(Vec3::ZERO, |s| s.radiance) * (0.25 * FRAC_1_PI)
+    sample.map_or(Vec3::ZERO, |s| medium.phase(w_o, s.w_i).value * s.radiance)
 }
 
-/// In-scattered radiance at `x` of light straight from skies, where media scatter alike in all directions.
-fn from_sky(world: &World<'_, Counted<'_>, LightSet>, x: Vec3, sampler: &mut Sampler) -> Vec3 {
+/// In-scattered radiance at `x` towards `w_o` of light straight from skies.
+fn from_sky(
+    world: &World<'_, Counted<'_>, LightSet>,
+    (x, w_o): (Vec3, Vec3),
+    sampler: &mut Sampler,
+) -> Vec3 {
+    let medium = world.media.at(x);
     let samples = direct::sky(world, x, None, sampler.next_2d());
-    samples.map(|s| s.radiance).sum::<Vec3>() * (0.25 * FRAC_1_PI)
+    samples
+        .map(|s| medium.phase(w_o, s.w_i).value * s.radiance)
+        .sum()
 }

@@ -65,7 +65,7 @@ pub(super) fn fill(
     // No smaller than coordinates are fine.
     let farthest = eyes.iter().map(|eye| eye.abs().max_element());
     let least = farthest.fold(f32::MIN_POSITIVE, |least, c| least.max(LEAST_WIDTH * c));
-    let mut filling = Filling::new(CellWidths::around(&eyes, WIDTH, least));
+    let mut filling = Filling::new(CellWidths::around(&eyes, WIDTH, least), &scene.media);
     let (mut first, mut held) = (0, 0);
     let mut cut_short = false;
     // Light where walks scatter first: how well it is known tells whether walks find what lights the scene.

@@ -40,7 +40,7 @@ impl Frame<'_> {
             run,
             view: self.view,
             seed: self.seed,
-            known: prepared.known(run.way),
+            known: prepared.known(),
             reach: run.reach(prepared.field.as_ref()),
         };
         let (mut film, tally, timed_out) = sampling.run(&layers, self.noise_target())?;

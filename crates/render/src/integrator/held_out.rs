@@ -4,19 +4,21 @@
 //! mean. They end in the same coarse field as records do, so what is wrong with that is not seen.
 
 use super::counted::Counted;
-use super::fill::media::{self, MediaCache};
+use super::fill::media::{self, For, MediaCache};
 use super::fill::surfaces::{self, SurfaceCache};
 use super::has_passed;
 use super::pilot::{self, Pilot};
 use super::view::View;
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
+use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_scene::Scene;
-use tyndall_transport::field::{Field, Part};
+use tyndall_transport::field::Field;
 use tyndall_transport::free_flight::FreeFlight;
-use tyndall_transport::gather::{self, GatherPattern};
+use tyndall_transport::gather::{self, GatherPattern, Towards, What};
 use tyndall_transport::irradiance::irradiance;
 use tyndall_transport::path::Reach;
 
@@ -31,6 +33,22 @@ const HELD_OUT: u64 = 1 << 48;
 const MOST_RAYS: usize = 2048;
 /// Keys of one block: the place and each gather have one.
 const KEYS: u64 = 1 + 2 * PLACES as u64;
+
+/// What light that is read adds to the relative error of the image.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub(super) struct Share {
+    /// Mean squared error; negative where noise outweighs it.
+    pub(super) squared: f64,
+    /// Standard error of that mean.
+    pub(super) deviation: f64,
+}
+
+impl Share {
+    /// Root mean square.
+    pub(super) fn error(self) -> f64 {
+        self.squared.max(0.0).sqrt()
+    }
+}
 
 /// What an evaluation is of.
 #[derive(Clone, Copy)]
@@ -52,6 +70,8 @@ pub(super) struct HeldOut<'s> {
     pub(super) views: &'s [View],
     pub(super) seed: u64,
     pub(super) reach: Reach<'s>,
+    /// For whom records of light in media are.
+    pub(super) for_whom: For,
     pub(super) pilot: &'s Pilot,
     /// When to stop.
     pub(super) deadline: Option<Instant>,
@@ -60,11 +80,11 @@ pub(super) struct HeldOut<'s> {
 impl HeldOut<'_> {
     /// What errors of `read` add to the relative error of the image, and the rays it took to know. Each gather takes `n_rays`, or
     /// [`MOST_RAYS`]. No error is known where the deadline came first.
-    pub(super) fn error(&self, read: Read<'_>, n_rays: usize) -> (Option<f64>, u64) {
+    pub(super) fn error(&self, read: Read<'_>, n_rays: usize) -> (Option<Share>, u64) {
         let pattern = GatherPattern::new(n_rays.min(MOST_RAYS));
         let geometry = Counted::new(self.scene);
         let blocks: Vec<usize> = (0..self.pilot.len()).step_by(EVERY).collect();
-        let squared: Option<f64> = (blocks.par_iter())
+        let squares: Option<Vec<f64>> = (blocks.par_iter())
             .map(|&block| {
                 if has_passed(self.deadline) {
                     return None;
@@ -75,9 +95,16 @@ impl HeldOut<'_> {
             })
             .collect::<Vec<Option<f64>>>()
             .into_iter()
-            .sum();
-        let root = |sum: f64| (sum / blocks.len() as f64).max(0.0).sqrt();
-        (squared.map(root), geometry.rays())
+            .collect();
+        let share = squares.map(|squares| {
+            let mut mean = Welford::new();
+            squares.iter().for_each(|&squared| mean.push(squared));
+            Share {
+                squared: mean.mean(),
+                deviation: mean.standard_error(),
+            }
+        });
+        (share, geometry.rays())
     }
 
     /// By how much what is read differs from two gathers on a camera ray through `block`; `None` where nothing is read.
@@ -109,28 +136,37 @@ impl HeldOut<'_> {
             return None;
         }
         let u = sampler.next_1d();
+        let towards = Some(Towards::Direction(-ray.direction));
         let mut difference = [Vec3::ZERO; 2];
         for place in 0..PLACES {
             let Some(t) = flight.sample_inside((place as f32 + u) / PLACES as f32) else {
                 continue;
             };
             let x = ray.at(t);
+            let medium = world.media.at(x);
             let known = match read {
-                Read::Field(field) => field.medium(geometry, x, Part::Indirect).map(|l| l.value),
-                Read::Multiple(cache) | Read::Sky(cache) => media::lookup(cache, x),
+                Read::Field(field) => {
+                    let light = field.leaving(geometry, (x, &medium), -ray.direction);
+                    light.map(|light| light.value)
+                }
+                Read::Multiple(cache) | Read::Sky(cache) => {
+                    let lobe = self.for_whom.lobe(&medium, -ray.direction);
+                    media::lookup(cache, x, lobe.as_ref())
+                }
                 Read::Surface(..) => None,
             };
             let Some(known) = known else {
                 continue;
             };
             let stop = flight.stop(t);
-            let weight = stop.transmittance * world.media.at(x).sigma_s / flight.pdf_inside(&stop);
+            let weight = stop.transmittance * medium.sigma_s / flight.pdf_inside(&stop);
             for (k, difference) in difference.iter_mut().enumerate() {
                 let key = key(1 + (2 * place + k) as u64);
-                let fresh = match read {
-                    Read::Sky(_) => gather::sky(&world, x, pattern, key),
-                    _ => gather::multiple(&world, x, pattern, self.reach, key),
+                let what = match read {
+                    Read::Sky(_) => What::Sky,
+                    _ => What::Scattered(self.reach),
                 };
+                let fresh = gather::towards(&world, x, towards, what, pattern, key);
                 *difference += weight * (known - fresh.value) / PLACES as f32;
             }
         }

@@ -141,7 +141,8 @@ impl<'s> Renderer<'s> {
         let mut views: Vec<View> = Vec::new();
         for &camera in cameras {
             let view = View::new(camera, self.run.frame);
-            let is_known = self.prepared.is_for(&view) || self.begun.contains(&view);
+            let has_begun = self.begun.contains(&view) && self.prepared.serves(&view);
+            let is_known = self.prepared.is_for(&view) || has_begun;
             if !is_known && !views.contains(&view) {
                 views.push(view);
             }
@@ -246,7 +247,6 @@ enum Way {
     PathIntegrator,
     NoMultiple,
     Records,
-    Paths,
 }
 
 impl Way {
@@ -259,10 +259,8 @@ impl Way {
             || max_depth.is_some_and(|max| max < least_multiple_depth(scene))
         {
             Self::NoMultiple
-        } else if scene.media.is_isotropic() {
-            Self::Records
         } else {
-            Self::Paths
+            Self::Records
         }
     }
 }

@@ -4,19 +4,23 @@
 
 use super::camera::{Camera, Known, Multiple};
 use super::field::FilledField;
-use super::fill::media::{Holds, Media};
+use super::fill::media::{self, For, Media};
 use super::fill::surfaces::{Side, Surfaces};
 use super::fill::{Fill, Filled, Kind, Light};
-use super::held_out::{HeldOut, Read};
+use super::held_out::{HeldOut, Read, Share};
 use super::pilot::{Pilot, Plan};
 use super::record_map::RecordMap;
 use super::view::View;
 use super::{FIELD_DEADLINE, FILL_DEADLINE, Run, Way, field, has_passed, is_lit};
 use crate::options::MultipleFrom;
 use crate::stats::Stats;
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
+use tyndall_transport::gather::What;
 use tyndall_transport::path::Reach;
-use tyndall_transport::walls::Walls;
+
+/// Standard errors by which an error has to stand out.
+const CERTAINTY: f64 = 2.0;
 
 /// What was computed, where it is of use.
 #[derive(Clone, Default, Deserialize, Serialize)]
@@ -30,14 +34,17 @@ pub(super) struct Prepared {
     pub(super) field: Option<FilledField>,
     /// Whether camera rays read multiple scattering from the field itself.
     pub(super) reads_field: bool,
-    pub(super) multiple: Option<Filled<Walls>>,
+    pub(super) multiple: Option<Filled<media::Known>>,
+    /// For whom records of light in media are, and the one eye, where they are for one.
+    pub(super) for_whom: For,
+    eye: Option<Vec3>,
     /// Single scattering of light from skies.
-    pub(super) sky: Option<Filled<Walls>>,
+    pub(super) sky: Option<Filled<media::Known>>,
     /// Single scattering of all light.
-    pub(super) single: Option<Filled<Walls>>,
+    pub(super) single: Option<Filled<media::Known>>,
     pub(super) surface: Option<Filled<Side>>,
     /// What each part of it adds to the relative error of the image, by layer, where that is known.
-    pub(super) shares: Vec<(Light, Option<f64>)>,
+    pub(super) shares: Vec<(Light, Option<Share>)>,
     /// Whether the deadline came before all of it was done and measured.
     #[serde(skip)]
     deadline_passed: bool,
@@ -48,18 +55,18 @@ pub(super) struct Prepared {
 
 impl Prepared {
     /// What camera samples read.
-    pub(super) fn known(&self, way: Way) -> Known<'_> {
+    pub(super) fn known(&self) -> Known<'_> {
         let field = self.field.as_ref().map(|filled| &filled.field);
         Known {
-            multiple: match (&self.multiple, way) {
-                (Some(filled), _) => Multiple::Records(&filled.cache),
-                (None, Way::Paths) => Multiple::Paths,
-                (None, _) => field
+            multiple: match &self.multiple {
+                Some(filled) => Multiple::Records(&filled.cache),
+                None => field
                     .filter(|_| self.reads_field)
                     .map_or(Multiple::None, Multiple::Field),
             },
             sky: self.sky.as_ref().map(|filled| &filled.cache),
             single: self.single.as_ref().map(|filled| &filled.cache),
+            for_whom: self.for_whom,
             indirect: self.surface.as_ref().map(|filled| &filled.cache),
         }
     }
@@ -87,19 +94,35 @@ impl Prepared {
     /// What each part adds to the relative error of the image, as far as it is known.
     pub(super) fn known_shares(&self) -> impl Iterator<Item = (&'static str, f64)> {
         let shares = self.shares.iter();
-        shares.filter_map(|&(light, share)| Some((light.layer(), share?)))
+        shares.filter_map(|&(light, share)| Some((light.layer(), share?.error())))
     }
 
     /// The relative error that all of it makes together; `None` where there is something whose error is not known.
     pub(super) fn error(&self) -> Option<f64> {
-        let squared = |share: &Option<f64>| share.map(|share| share * share);
+        let squared = |share: &Option<Share>| share.map(|share| share.squared.max(0.0));
         let sum: Option<f64> = self.shares.iter().map(|(_, share)| squared(share)).sum();
         sum.map(f64::sqrt)
     }
 
+    /// The relative error that all of it makes at least, as far as noise lets that be known.
+    pub(super) fn least_error(&self) -> Option<f64> {
+        let (mut squared, mut variance) = (0.0, 0.0);
+        for (_, share) in &self.shares {
+            let share = (*share)?;
+            squared += share.squared;
+            variance += share.deviation * share.deviation;
+        }
+        Some((squared - CERTAINTY * variance.sqrt()).max(0.0).sqrt())
+    }
+
     /// Whether it was computed for this view.
     pub(super) fn is_for(&self, view: &View) -> bool {
-        self.views.contains(view)
+        self.views.contains(view) && self.serves(view)
+    }
+
+    /// Whether its records in media, if they are for one eye alone, are for that of `view`.
+    pub(super) fn serves(&self, view: &View) -> bool {
+        self.eye.is_none_or(|eye| eye == view.eye())
     }
 
     /// Adds all records to a map of them.
@@ -171,8 +194,15 @@ impl Run<'_> {
         if way != Way::Records && !holds_surfaces {
             return Prepared::default();
         }
-        let mut prepared = Prepared::default();
-        let field = self.has_field().then(|| self.field(views));
+        let (for_whom, eye) = self.for_whom(views);
+        let mut prepared = Prepared {
+            for_whom,
+            eye,
+            ..Prepared::default()
+        };
+        let all_views = views;
+        let views = &self.seen_from(eye, views)[..];
+        let field = self.has_field().then(|| self.field(all_views));
         let reach = self.reach(field.as_ref());
         let pilot = self.pilot(views, reach);
         let plan = pilot.plan(self.error);
@@ -182,6 +212,7 @@ impl Run<'_> {
             views,
             seed: self.options.seed,
             reach,
+            for_whom: prepared.for_whom,
             pilot: &pilot,
             deadline: self.deadline(FILL_DEADLINE),
         };
@@ -192,14 +223,16 @@ impl Run<'_> {
             error
         };
         if way == Way::Records {
-            let kind = self.media(views, Holds::Multiple(reach), plan.multiple);
+            let what = (What::Scattered(reach), prepared.for_whom);
+            let kind = self.media(views, what, plan.multiple);
             let in_field = reach
                 .field
                 .filter(|_| self.options.multiple != MultipleFrom::Records);
             let field_error = in_field.and_then(|field| check(Read::Field(field), kind.n_rays()));
             let allowed = f64::from(Plan::SCATTERED * self.error);
             let is_forced = self.options.multiple == MultipleFrom::Field && in_field.is_some();
-            prepared.reads_field = is_forced || field_error.is_some_and(|error| error <= allowed);
+            prepared.reads_field =
+                is_forced || field_error.is_some_and(|share| share.error() <= allowed);
             let error = if prepared.reads_field {
                 field_error
             } else {
@@ -214,7 +247,7 @@ impl Run<'_> {
         if let Some(error) = plan.sky_from(self.options.single)
             && self.may_hold_sky()
         {
-            let kind = self.media(views, Holds::Sky, error);
+            let kind = self.media(views, (What::Sky, prepared.for_whom), error);
             let n_rays = kind.n_rays();
             let filled = self.fill(views, kind, None);
             let error = check(Read::Sky(&filled.cache), n_rays);
@@ -224,7 +257,7 @@ impl Run<'_> {
         if holds_surfaces {
             let kind = self.surfaces(reach, prepared.sky.is_some(), plan.surface);
             let (n_rays, sky) = (kind.n_rays(), kind.sky);
-            let filled = self.fill(views, kind, None);
+            let filled = self.fill(all_views, kind, None);
             let error = check(Read::Surface(&filled.cache, sky), n_rays);
             prepared.shares.push((Light::Surface, error));
             prepared.surface = Some(filled);
@@ -243,20 +276,42 @@ impl Run<'_> {
             return prepared;
         };
         let reach = self.reach(prepared.field.as_ref());
+        let all_views = views;
+        if !views.iter().all(|view| prepared.serves(view)) {
+            (prepared.for_whom, prepared.eye) = self.for_whom(views);
+            for filled in [&mut prepared.multiple, &mut prepared.sky] {
+                *filled = filled.take().map(|_| Filled::empty());
+            }
+        }
+        let views = &self.seen_from(prepared.eye, views)[..];
         if let Some(filled) = prepared.multiple.take() {
-            let kind = self.media(views, Holds::Multiple(reach), plan.multiple);
+            let what = (What::Scattered(reach), prepared.for_whom);
+            let kind = self.media(views, what, plan.multiple);
             prepared.multiple = Some(self.fill(views, kind, Some(filled)));
         }
         if let Some(filled) = prepared.sky.take() {
-            let kind = self.media(views, Holds::Sky, plan.sky);
+            let kind = self.media(views, (What::Sky, prepared.for_whom), plan.sky);
             prepared.sky = Some(self.fill(views, kind, Some(filled)));
         }
         if let Some(filled) = prepared.surface.take() {
             let kind = self.surfaces(reach, prepared.sky.is_some(), plan.surface);
-            prepared.surface = Some(self.fill(views, kind, Some(filled)));
+            prepared.surface = Some(self.fill(all_views, kind, Some(filled)));
         }
         prepared.deadline_passed = has_passed(self.deadline(FILL_DEADLINE));
         prepared
+    }
+
+    /// For whom records of light in media are to be, and the one eye, where they are for one.
+    fn for_whom(&self, views: &[View]) -> (For, Option<Vec3>) {
+        let for_whom = For::views(self.scene, views, self.error);
+        let is_one = for_whom == For::Eye && !self.scene.media.is_isotropic();
+        (for_whom, is_one.then(|| views[0].eye()))
+    }
+
+    /// Those of `views` that are seen from one `eye`, if it has to be one.
+    fn seen_from(&self, eye: Option<Vec3>, views: &[View]) -> Vec<View> {
+        let is_seen = |view: &&View| eye.is_none_or(|eye| eye == view.eye());
+        views.iter().filter(is_seen).copied().collect()
     }
 
     /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
@@ -264,7 +319,6 @@ impl Run<'_> {
         self.way != Way::PathIntegrator
             && is_lit(self.scene)
             && self.max_depth.is_none()
-            && self.scene.media.is_isotropic()
             && (self.way == Way::Records || !self.scene.geometry.is_empty())
     }
 
@@ -318,8 +372,8 @@ impl Run<'_> {
         fill.run(known.unwrap_or_else(Filled::empty), self.progress)
     }
 
-    fn media<'r>(&'r self, views: &[View], holds: Holds<'r>, error: f32) -> Media<'r> {
-        Media::new(self.scene, views, holds, self.options.seed, error)
+    fn media<'r>(&'r self, views: &[View], what: (What<'r>, For), error: f32) -> Media<'r> {
+        Media::new(self.scene, views, what, self.options.seed, error)
     }
 
     fn surfaces<'r>(&'r self, reach: Reach<'r>, sky: bool, error: f32) -> Surfaces<'r> {
@@ -337,11 +391,12 @@ impl Run<'_> {
         let known = Known {
             multiple: match (self.way, reach.field) {
                 (Way::Records, Some(field)) => Multiple::Field(field),
-                (Way::Records | Way::Paths, _) => Multiple::Paths,
+                (Way::Records, None) => Multiple::Paths,
                 _ => Multiple::None,
             },
             sky: None,
             single: None,
+            for_whom: For::Eye,
             indirect: None,
         };
         let camera = |view| Camera::new(self.scene, view, reach);

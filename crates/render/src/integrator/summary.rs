@@ -17,12 +17,6 @@ pub(super) fn notes(
     timed_out: bool,
 ) -> Vec<String> {
     let mut notes = Vec::new();
-    if run.way == Way::Paths {
-        notes.push(
-            "records for anisotropic media are not built yet: multiple scattering is path traced, which is slower and leaves noise"
-                .to_owned(),
-        );
-    }
     if tally.dropped > 0 {
         notes.push(format!(
             "{} camera samples were not finite and count as black: this is a bug, please report it with the scene",
@@ -55,7 +49,10 @@ pub(super) fn notes(
         );
     }
     let tolerated = TOLERATED * f64::from(run.error);
-    if let Some(error) = prepared.error().filter(|&error| error > tolerated)
+    if let Some(error) = prepared.error()
+        && prepared
+            .least_error()
+            .is_some_and(|least| least > tolerated)
         && run.options.spp.is_none()
     {
         notes.push(short_of_error(prepared, error));
@@ -84,21 +81,19 @@ pub(super) fn summary(run: &Run<'_>, prepared: &Prepared, stats: &Stats) -> Stri
         (_, Some(_)) => format!("{} records", count("single")),
         (None, None) => "direct".to_owned(),
     };
+    let sh = sh(prepared);
     let found = match run.way {
         Way::PathIntegrator => "integrator: path".to_owned(),
-        Way::NoMultiple => format!("records: {surface} surface; single: {how_single}; SH: off"),
+        Way::NoMultiple => format!("records: {surface} surface; single: {how_single}; SH: {sh}"),
         Way::Records if prepared.reads_field => {
             format!(
-                "multiple: coarse field; records: {surface} surface; single: {how_single}; SH: off"
+                "multiple: coarse field; records: {surface} surface; single: {how_single}; SH: {sh}"
             )
         }
         Way::Records => format!(
-            "records: {} multiple, {surface} surface; single: {how_single}; SH: off",
+            "records: {} multiple, {surface} surface; single: {how_single}; SH: {sh}",
             count("multiple")
         ),
-        Way::Paths => {
-            "records: none, multiple scattering path traced; single: direct; SH: off".to_owned()
-        }
     };
     let method = if run.is_jarosz08() {
         "; method: jarosz08"
@@ -106,6 +101,19 @@ pub(super) fn summary(run: &Run<'_>, prepared: &Prepared, stats: &Stats) -> Stri
         ""
     };
     format!("{}; {found}{method}", run.scene.summary())
+}
+
+/// To which band directions of light are held.
+fn sh(prepared: &Prepared) -> String {
+    let order = prepared
+        .field
+        .as_ref()
+        .map_or(0, |filled| filled.field.order());
+    if order == 0 {
+        "off".to_owned()
+    } else {
+        format!("order {order}")
+    }
 }
 
 /// A number with its thousands set apart.

@@ -14,7 +14,7 @@ use serde::Serialize;
 use tyndall_math::{Key, Purpose};
 use tyndall_scene::Scene;
 use tyndall_transport::Lights;
-use tyndall_transport::gather::{self, GatherPattern};
+use tyndall_transport::gather::{self, GatherPattern, Towards};
 use tyndall_transport::inscatter::{self, Inscattered, Order};
 use tyndall_transport::path::Reach;
 
@@ -155,7 +155,7 @@ pub fn probe(scene: &Scene, options: &ProbeOptions) -> Result<Probe, ProbeError>
             let g = gather::multiple_towards(
                 &world,
                 options.at,
-                towards,
+                towards.map(Towards::Direction),
                 &GatherPattern::new(samples),
                 options.derivatives,
                 Reach::depth(max_depth),

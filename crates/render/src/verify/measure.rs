@@ -7,7 +7,7 @@ use super::{Budget, Row};
 use glam::Vec3;
 use tyndall_math::stats::Welford;
 use tyndall_math::{Key, Purpose, Ray, Sampler};
-use tyndall_transport::gather::{self, Derivatives, GatherPattern};
+use tyndall_transport::gather::{self, Derivatives, GatherPattern, Towards};
 use tyndall_transport::inscatter::{self, Order};
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
@@ -214,7 +214,7 @@ fn measure(
         let g = gather::multiple_towards(
             world,
             point.x,
-            point.towards,
+            point.towards.map(Towards::Direction),
             pattern,
             Derivatives::Aware,
             Reach::default(),

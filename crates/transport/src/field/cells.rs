@@ -3,6 +3,7 @@
 //! A point lies in a cell of each size; cells in media are one for all directions, cells on surfaces one for each side that surfaces
 //! face.
 
+use super::bands::Bands;
 use glam::{DVec3, IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -189,20 +190,46 @@ pub(super) struct Side {
     pub(super) sum: Sum,
     /// The next side of the same cell.
     next: Option<u32>,
+    /// Which of [`Cells::bands`] tell from where its light comes, in media that do not scatter alike in all directions.
+    pub(super) bands: Option<u32>,
 }
 
 /// Cells by their keys. Most have one side; those that surfaces part have more.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells {
     pub(super) sides: Vec<Side>,
+    pub(super) bands: Vec<Bands>,
+    /// Whether sides in media have bands.
+    has_bands: bool,
     first_sides: HashMap<u128, u32, BuildHasherDefault<KeyHasher>>,
 }
 
 impl Cells {
-    /// The cells that these sides make up; `None` where their numbers do not fit together.
-    pub(super) fn from_sides(sides: Vec<Side>) -> Option<Self> {
+    /// No cells yet; those in media tell from where their light comes if `has_bands`.
+    pub(super) fn new(has_bands: bool) -> Self {
+        Self {
+            has_bands,
+            ..Self::default()
+        }
+    }
+
+    /// Whether cells in media tell from where their light comes.
+    pub(super) fn has_bands(&self) -> bool {
+        self.has_bands
+    }
+
+    /// The cells that these sides and their bands make up; `None` where their numbers do not fit together.
+    pub(super) fn from_sides(sides: Vec<Side>, bands: Vec<Bands>, has_bands: bool) -> Option<Self> {
+        if !bands.iter().all(Bands::is_finite) {
+            return None;
+        }
         let mut is_first = vec![true; sides.len()];
         for (i, side) in sides.iter().enumerate() {
+            let wants_bands = has_bands && side.place.kind == Kind::Medium;
+            let has_them = side.bands.map(|index| (index as usize) < bands.len());
+            if has_them != wants_bands.then_some(true) {
+                return None;
+            }
             if !EXPONENTS.contains(&side.place.exponent) || !side.sum.is_light() {
                 return None;
             }
@@ -223,7 +250,12 @@ impl Cells {
                 return None;
             }
         }
-        Some(Self { sides, first_sides })
+        Some(Self {
+            sides,
+            bands,
+            has_bands,
+            first_sides,
+        })
     }
 
     /// The first side of the cell at `place`.
@@ -242,7 +274,12 @@ impl Cells {
     }
 
     fn push(&mut self, place: Place, anchor: Vec3, normal: Vec3) {
+        let bands = (self.has_bands && place.kind == Kind::Medium).then(|| {
+            self.bands.push(Bands::default());
+            self.bands.len() as u32 - 1
+        });
         self.sides.push(Side {
+            bands,
             place,
             anchor,
             normal,

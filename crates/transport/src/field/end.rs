@@ -3,11 +3,12 @@
 //! What lies near is known too coarsely where light changes most: there, light straight from lights is sampled.
 
 use super::{Field, FieldLight, Part};
+use crate::direct;
 use crate::free_flight::FreeFlight;
+use crate::gather::{self, GatherDirections};
 use crate::path::{Reach, Source, Vertex, Visitor, source};
 use crate::single::SegmentLight;
 use crate::world::{Geometry, Lights, SurfaceHit, World};
-use crate::{direct, gather};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 use tyndall_math::{Ray, Sampler};
@@ -15,10 +16,10 @@ use tyndall_math::{Ray, Sampler};
 /// The part of a path's numbers that stands in for what no cell knows.
 const UNKNOWN: u64 = 0xf1e1d;
 
-/// Light in the medium at `x` by one path, where no cell knows it.
+/// Light that leaves the medium at `x` in the direction `w_o` by one path, where no cell knows it.
 fn traced<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
-    x: Vec3,
+    (x, w_o): (Vec3, Vec3),
     part: Part,
     sampler: &mut Sampler,
 ) -> FieldLight {
@@ -27,11 +28,22 @@ fn traced<G: Geometry, L: Lights>(
         Part::Indirect => None,
         Part::All => direct::sample(world, x, None, sampler.next_1d(), sampler.next_2d()),
     };
-    // Fields are for media that scatter alike in all directions.
+    // Direct light is asked for only where media scatter alike in all directions.
     let direct = direct.map_or(Vec3::ZERO, |s| s.radiance * (0.25 * FRAC_1_PI));
+    let directions = GatherDirections::new(world, x, Some(w_o));
     FieldLight {
-        value: direct + gather::one(world, x, Reach::default(), &mut sampler),
+        value: direct + gather::one_of(&directions, world, x, Reach::default(), &mut sampler),
         gradient: [Vec3::ZERO; 3],
+    }
+}
+
+/// A gradient over the value it belongs to, of either sign; 0 where there is no value.
+fn relative(gradient: Vec3, value: f32) -> Vec3 {
+    let relative = gradient / value;
+    if relative.is_finite() {
+        relative
+    } else {
+        Vec3::ZERO
     }
 }
 
@@ -59,7 +71,7 @@ impl Field {
         };
         let near = self.near(ray.origin);
         let mut tell = |value: Vec3, vertex: Vertex<'_, '_>, source: Source| {
-            if value.is_finite() && value.max_element() > 0.0 {
+            if value.is_finite() && value != Vec3::ZERO {
                 visitor.light(throughput * value, Some(vertex), source);
             }
         };
@@ -69,14 +81,16 @@ impl Field {
             let x = ray.at(t);
             let part = if t < near { Part::Indirect } else { Part::All };
             let medium = world.media.at(x);
-            let light = self
-                .medium(world.geometry, x, part)
-                .unwrap_or_else(|| traced(world, x, part, sampler));
+            let w_o = -ray.direction;
+            let light = match part {
+                Part::All => self.medium(world.geometry, x, part),
+                Part::Indirect => self.leaving(world.geometry, (x, &medium), w_o),
+            };
+            let light = light.unwrap_or_else(|| traced(world, (x, w_o), part, sampler));
             let stop = flight.stop(t);
             let value =
                 stop.transmittance * medium.sigma_s * light.value / flight.pdf_inside(&stop);
-            let log_gradient =
-                std::array::from_fn(|c| light.gradient[c] / light.value[c].max(f32::MIN_POSITIVE));
+            let log_gradient = std::array::from_fn(|c| relative(light.gradient[c], light.value[c]));
             tell(
                 value,
                 Vertex::Medium(x, &medium),

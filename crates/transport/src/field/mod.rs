@@ -3,12 +3,14 @@
 //! Walks from the eye leave at each of their vertices an unbiased estimate of the light there; a cell's mean is right for the cell as a
 //! whole. Only a path's later vertices read it, so that what a cell blurs is seen through one scattering more.
 
+mod bands;
 mod cells;
 mod end;
 mod stored;
 mod walk;
 
 use crate::world::{Geometry, Lights, SurfaceHit, World};
+use bands::ORDER;
 use cells::{Cells, Kind, Light, MOST_SIDES, NO_LINK, Place, SIZES, Side, width};
 use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -16,6 +18,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use stored::Stored;
 use tyndall_math::{Ray, Sampler};
+use tyndall_media::{Media, MediumPoint};
 
 pub use cells::CellWidths;
 pub use walk::Found;
@@ -39,14 +42,16 @@ const NEAR: f32 = 8.0;
 pub struct Filling {
     widths: CellWidths,
     cells: Cells,
+    unheld: f32,
 }
 
 impl Filling {
-    /// Nothing yet, in cells of `widths`.
-    pub fn new(widths: CellWidths) -> Self {
+    /// Nothing yet, in cells of `widths`, for light in `media`.
+    pub fn new(widths: CellWidths, media: &Media) -> Self {
         Self {
             widths,
-            cells: Cells::default(),
+            cells: Cells::new(!media.is_isotropic()),
+            unheld: media.largest_moment(ORDER + 1),
         }
     }
 
@@ -91,8 +96,13 @@ impl Filling {
             self.cells
                 .seen_or_added(geometry, cell, (from, found.place.normal))
         });
-        if let Some(side) = side {
-            self.cells.sides[side as usize].sum.add(&found.light.into());
+        let Some(side) = side else {
+            return;
+        };
+        let side = &mut self.cells.sides[side as usize];
+        side.sum.add(&found.light.into());
+        if let (Some(index), Some(w_i)) = (side.bands, found.from) {
+            self.cells.bands[index as usize].add(w_i, found.light.indirect);
         }
     }
 
@@ -113,6 +123,7 @@ impl Filling {
                     anchor,
                     normal,
                     sum,
+                    bands,
                     ..
                 } = self.cells.sides[side as usize];
                 if exponent + 1 >= self.widths.exponent(anchor, place.kind) + SIZES {
@@ -120,7 +131,12 @@ impl Filling {
                 }
                 let cell = self.cells.find_or_add(place.larger(), anchor, normal);
                 if let Some(larger) = self.cells.seen_or_added(geometry, cell, (anchor, normal)) {
-                    self.cells.sides[larger as usize].sum.add(&sum);
+                    let larger = &mut self.cells.sides[larger as usize];
+                    larger.sum.add(&sum);
+                    if let (Some(from), Some(to)) = (bands, larger.bands) {
+                        let bands = self.cells.bands[from as usize];
+                        self.cells.bands[to as usize].merge(&bands);
+                    }
                 }
             }
             let added = held..self.cells.sides.len() as u32;
@@ -132,6 +148,7 @@ impl Filling {
             light: self.cells.means(),
             widths: self.widths,
             cells: self.cells,
+            unheld: self.unheld,
         }
     }
 }
@@ -219,6 +236,8 @@ pub struct Field {
     cells: Cells,
     light: Vec<Light>,
     surroundings: Vec<Surroundings>,
+    /// How much scattering leaves of the first band that cells do not hold.
+    unheld: f32,
 }
 
 /// What surrounds the place from which a cell was seen first.
@@ -271,8 +290,13 @@ impl Asked {
 
 impl Field {
     /// The field of what walks `found`, computed by one thread; for many there is [`Filling`].
-    pub fn new<G: Geometry>(geometry: &G, widths: CellWidths, found: &[Found]) -> Self {
-        let mut filling = Filling::new(widths);
+    pub fn new<G: Geometry>(
+        geometry: &G,
+        media: &Media,
+        widths: CellWidths,
+        found: &[Found],
+    ) -> Self {
+        let mut filling = Filling::new(widths, media);
         let cells = filling.place(found);
         for (found, &cell) in found.iter().zip(&cells) {
             let side = filling.side(geometry, cell, found);
@@ -362,13 +386,58 @@ impl Field {
         })
     }
 
-    /// A distance from `p` within which the size of cells in media would show.
+    /// A distance from `p` within which the size of cells in media would show, and light straight from lights is sampled: everywhere
+    /// if cells tell directions, which are too few for it.
     pub(crate) fn near(&self, p: Vec3) -> f32 {
+        if self.cells.has_bands() {
+            return f32::INFINITY;
+        }
         NEAR * width(self.widths.exponent(p, Kind::Medium))
     }
 
-    /// `part` of the light in the medium at `p`, interpolated between the middles of cells; `None` where too little is known of it.
+    /// The highest band of the directions that cells in media hold.
+    pub fn order(&self) -> usize {
+        if self.cells.has_bands() { ORDER } else { 0 }
+    }
+
+    /// The share of the finest directions of light that one scattering leaves and that cells do not hold.
+    pub fn unheld(&self) -> f32 {
+        self.unheld
+    }
+
+    /// `part` of the light in the medium at `p` where media scatter alike in all directions, interpolated between the middles of cells;
+    /// `None` where too little is known of it.
     pub fn medium<G: Geometry>(&self, geometry: &G, p: Vec3, part: Part) -> Option<FieldLight> {
+        self.interpolated(geometry, p, |side| part.of(&self.light[side]))
+    }
+
+    /// Indirect light that leaves the point `p` of `medium` in the unit direction `w_o`, as [`Field::medium`] has it; of the light's
+    /// directions as much counts as cells hold, so that it may come out a little below zero.
+    pub fn leaving<G: Geometry>(
+        &self,
+        geometry: &G,
+        (p, medium): (Vec3, &MediumPoint<'_>),
+        w_o: Vec3,
+    ) -> Option<FieldLight> {
+        if !self.cells.has_bands() {
+            return self.medium(geometry, p, Part::Indirect);
+        }
+        let lobe = bands::lobe(medium, w_o);
+        self.interpolated(geometry, p, |side| {
+            let Side { sum, bands, .. } = &self.cells.sides[side];
+            let bands = bands.map(|index| &self.cells.bands[index as usize]);
+            let turned = bands.map_or(Vec3::ZERO, |bands| bands.leaving(&lobe));
+            self.light[side].indirect + turned / sum.n as f32
+        })
+    }
+
+    /// What `light` says of cells, interpolated at `p`.
+    fn interpolated<G: Geometry>(
+        &self,
+        geometry: &G,
+        p: Vec3,
+        light: impl Fn(usize) -> Vec3,
+    ) -> Option<FieldLight> {
         let home = self.side_at(geometry, &Asked::in_medium(p))? as usize;
         let place = self.cells.sides[home].place;
         let inv_width = 1.0 / width(place.exponent);
@@ -390,7 +459,7 @@ impl Field {
             let w = high * f + (1.0 - high) * (1.0 - f);
             let sign = 2.0 * high - 1.0;
             let slope = Vec3::new(w.y * w.z, w.x * w.z, w.x * w.y) * sign * inv_width;
-            corners.push((w.element_product(), slope, part.of(&self.light[cell])));
+            corners.push((w.element_product(), slope, light(cell)));
         }
         let total: f32 = corners.iter().map(|(w, ..)| w).sum();
         let sum: Vec3 = corners.iter().map(|&(w, _, light)| light * w).sum();

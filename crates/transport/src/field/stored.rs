@@ -1,5 +1,6 @@
 //! A field as it is kept in a file: its cells and what surrounds them; all else follows from these.
 
+use super::bands::Bands;
 use super::cells::{CellWidths, Cells, NO_LINK, Side};
 use super::{Field, Surroundings};
 use serde::{Deserialize, Serialize, Serializer};
@@ -11,6 +12,9 @@ pub(super) struct Stored<'f> {
     widths: Cow<'f, CellWidths>,
     sides: Cow<'f, [Side]>,
     surroundings: Cow<'f, [Surroundings]>,
+    bands: Cow<'f, [Bands]>,
+    has_bands: bool,
+    unheld: f32,
 }
 
 /// Why numbers make no field.
@@ -22,6 +26,9 @@ impl Serialize for Field {
             widths: Cow::Borrowed(&self.widths),
             sides: Cow::Borrowed(&self.cells.sides),
             surroundings: Cow::Borrowed(&self.surroundings),
+            bands: Cow::Borrowed(&self.cells.bands),
+            has_bands: self.cells.has_bands(),
+            unheld: self.unheld,
         };
         stored.serialize(serializer)
     }
@@ -37,11 +44,16 @@ impl TryFrom<Stored<'_>> for Field {
         if stored.surroundings.len() != n || !stored.surroundings.iter().all(has_links) {
             return Err(NO_FIELD);
         }
-        let cells = Cells::from_sides(stored.sides.into_owned()).ok_or(NO_FIELD)?;
+        let (sides, bands) = (stored.sides.into_owned(), stored.bands.into_owned());
+        let cells = Cells::from_sides(sides, bands, stored.has_bands).ok_or(NO_FIELD)?;
+        if !stored.unheld.is_finite() {
+            return Err(NO_FIELD);
+        }
         Ok(Self {
             widths: stored.widths.into_owned(),
             light: cells.means(),
             surroundings: stored.surroundings.into_owned(),
+            unheld: stored.unheld,
             cells,
         })
     }

@@ -23,6 +23,8 @@ const LONG_SURVIVAL: f32 = 0.95;
 const SURVIVAL_MIN: f32 = 0.1;
 /// Free flights follow each channel at least this much as the brightest.
 const LEAST_CHANNEL: f32 = 0.1;
+/// Share of a walk's directions that follow a phase function.
+const UNEVEN: f32 = 0.5;
 /// Sets of four sample dimensions for each stretch.
 const SETS_PER_STRETCH: u32 = 3;
 
@@ -30,12 +32,14 @@ const SETS_PER_STRETCH: u32 = 3;
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     pub(super) place: Asked,
-    /// In a medium in-scattered radiance, on a surface irradiance over π.
+    /// In a medium the mean radiance over the sphere, on a surface irradiance over π.
     pub(super) light: Light,
+    /// The unit direction from which all indirect light comes.
+    pub(super) from: Option<Vec3>,
 }
 
 impl Found {
-    /// In-scattered radiance in a medium, irradiance over π on a surface, W/(m² sr).
+    /// Mean radiance over the sphere in a medium, irradiance over π on a surface, W/(m² sr).
     pub fn light(&self) -> Vec3 {
         self.light.all
     }
@@ -62,6 +66,7 @@ pub(super) fn walk<G: Geometry, L: Lights>(
     found: &mut Vec<Found>,
 ) {
     let mut vertices: Vec<Vertex> = Vec::with_capacity(16);
+    let alike = world.media.is_isotropic();
     // From the start on: it steers which channel free flights follow.
     let mut throughput = Vec3::ONE;
     loop {
@@ -85,7 +90,13 @@ pub(super) fn walk<G: Geometry, L: Lights>(
                 let x = ray.at(t);
                 let medium = world.media.at(x);
                 let stretch = stop.transmittance * medium.sigma_s / flight.pdf(&stop);
-                in_medium(world, x, &medium, (w_o, stretch), lights, direction)
+                in_medium(
+                    world,
+                    (x, &medium, alike),
+                    (w_o, stretch),
+                    lights,
+                    direction,
+                )
             }
             (None, Some(hit)) => {
                 let stretch = flight.transmittance() / flight.pass();
@@ -115,7 +126,12 @@ pub(super) fn walk<G: Geometry, L: Lights>(
         }
         vertices.push(vertex);
         match onward {
-            Some((onward, _)) if roulette < survival => ray = onward,
+            Some((onward, _)) if roulette < survival => {
+                if let Some(last) = vertices.last_mut() {
+                    last.found.from = Some(onward.direction);
+                }
+                ray = onward;
+            }
             _ => break,
         }
     }
@@ -148,31 +164,52 @@ type Onward = Option<(Ray, f32)>;
 
 fn in_medium<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
-    x: Vec3,
-    medium: &MediumPoint<'_>,
+    (x, medium, alike): (Vec3, &MediumPoint<'_>, bool),
     (w_o, stretch): (Vec3, Vec3),
     lights: LightNumbers,
     direction: [f32; 2],
 ) -> (Vertex, Onward) {
-    let lit: Vec3 = direct::from_all(world, x, None, lights)
-        .map(|s| medium.phase(w_o, s.w_i).value * s.radiance)
-        .sum();
-    let (w_i, pdf) = medium.sample_phase(w_o, direction);
-    let weight = medium.phase(w_o, w_i).value / pdf;
+    let even = 0.25 * FRAC_1_PI;
+    let (mut lit, mut leaving) = (Vec3::ZERO, Vec3::ZERO);
+    for s in direct::from_all(world, x, None, lights) {
+        lit += even * s.radiance;
+        leaving += medium.phase(w_o, s.w_i).value * s.radiance;
+    }
+    let w_i = onward_direction(medium, alike, w_o, direction);
+    // Half of the directions are spread evenly, which bounds the weight of what cells hold.
+    let pdf = if alike {
+        even
+    } else {
+        UNEVEN * medium.phase_pdf(w_o, w_i) + (1.0 - UNEVEN) * even
+    };
+    let carried = [Vec3::splat(even), medium.phase(w_o, w_i).value].map(|weight| weight / pdf);
     let albedo =
         (medium.sigma_s / medium.sigma_t.max(Vec3::splat(f32::MIN_POSITIVE))).max_element();
     let vertex = Vertex {
         found: Found {
             place: Asked::in_medium(x),
             light: Light::direct(lit),
+            from: None,
         },
-        leaving: lit,
-        carried: [weight; 2],
+        leaving,
+        carried,
         stretch,
         emitted: Vec3::ZERO,
     };
-    let scatters = albedo > 0.0 && weight.is_finite();
+    let scatters = albedo > 0.0 && carried.iter().all(|c| c.is_finite());
     (vertex, scatters.then(|| (Ray::new(x, w_i), albedo)))
+}
+
+/// A direction by the phase function or any direction; all are `alike` where media scatter so.
+fn onward_direction(medium: &MediumPoint<'_>, alike: bool, w_o: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+    if alike {
+        return warp::uniform_sphere([u, v]);
+    }
+    if u < UNEVEN {
+        return medium.sample_phase(w_o, [u / UNEVEN, v]).0;
+    }
+    let u = ((u - UNEVEN) / (1.0 - UNEVEN)).min(1.0 - f32::EPSILON);
+    warp::uniform_sphere([u, v])
 }
 
 fn on_surface<G: Geometry, L: Lights>(
@@ -213,6 +250,7 @@ fn on_surface<G: Geometry, L: Lights>(
         found: Found {
             place: Asked::on_surface(hit),
             light: Light::direct(lit),
+            from: None,
         },
         leaving,
         carried,

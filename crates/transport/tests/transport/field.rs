@@ -42,7 +42,7 @@ fn fields<G: Geometry>(
             Filling::walk(world, ray, &mut sampler, &mut found);
         }
     }
-    Field::new(world.geometry, widths, &found)
+    Field::new(world.geometry, world.media, widths, &found)
 }
 
 #[test]

@@ -5,6 +5,7 @@
     reason = "a failing table is easier to read whole"
 )]
 
+mod anisotropic;
 mod exact;
 mod field;
 mod inscatter;

@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use tyndall_math::spherical::SphericalRectangle;
 use tyndall_math::{Key, Purpose, Ray};
 use tyndall_media::Media;
-use tyndall_transport::gather::{self, GatherPattern};
+use tyndall_transport::gather::{self, GatherPattern, What};
 use tyndall_transport::irradiance::irradiance;
 use tyndall_transport::path::Reach;
 use tyndall_transport::{Bsdf, Geometry, SurfaceHit, World};
@@ -73,7 +73,7 @@ fn a_record_of_sky_light_knows_the_window_and_how_it_moves() {
         let n = 16;
         let (mut value, mut gradient) = (0.0, Vec3::ZERO);
         for i in 0..n {
-            let found = gather::sky(&world, x, &pattern, key(i));
+            let found = gather::towards(&world, x, None, What::Sky, &pattern, key(i));
             value += found.value.x / n as f32;
             gradient += found.gradient[0] / n as f32;
         }

@@ -129,7 +129,7 @@ impl<'s> Volume<'s> {
 }
 
 impl Kind for Volume<'_> {
-    type Tag = Walls;
+    type Tag = media::Known;
 
     const RADIUS_SLOPE: f32 = f32::INFINITY;
 
@@ -151,7 +151,7 @@ impl Kind for Volume<'_> {
         candidate: &Candidate,
         index: u64,
         _round: usize,
-    ) -> Option<(Record<3>, Walls)> {
+    ) -> Option<(Record<3>, media::Known)> {
         let world = geometry.world(self.scene);
         let x = candidate.position;
         let blind = Derivatives::Blind;
@@ -171,7 +171,7 @@ impl Kind for Volume<'_> {
         };
         let limits = (self.height, self.tolerance);
         let record = record_as_published(candidate, limits, value, gradient, norm)?;
-        Some((record, Walls::NONE))
+        Some((record, media::Known::within(Walls::NONE)))
     }
 }
 

@@ -76,7 +76,7 @@ impl Light {
 }
 
 /// The first of some attempts, with ever more rays, whose noise is small for a target `error` of the image; else the last.
-fn quiet_enough(error: f32, gather: impl Fn(usize) -> Gathered) -> Gathered {
+fn quiet_enough(error: f32, mut gather: impl FnMut(usize) -> Gathered) -> Gathered {
     let mut attempt = 0;
     loop {
         let found = gather(attempt);
