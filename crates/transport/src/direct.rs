@@ -47,14 +47,19 @@ pub(crate) struct LightNumbers {
     pub(crate) depth: f32,
 }
 
-/// Samples of [`lamps`] and [`sky`] together, for those who average many of them: light through thick media arrives by chance.
+/// Samples of [`lamps`] and [`sky`] together, for those who average many of them: light through thick smoke arrives by chance.
 pub(crate) fn from_all<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
     p: Vec3,
     hit: Option<&SurfaceHit>,
     numbers: LightNumbers,
 ) -> impl Iterator<Item = DirectSample> {
-    let passes = Passes::ByChance(numbers.depth);
+    // Where depth has a closed form chance would only add noise.
+    let passes = if world.media.has_grids() {
+        Passes::ByChance(numbers.depth)
+    } else {
+        Passes::AsItDoes
+    };
     let lamp = lamps_that(world, p, hit, (numbers.choice, numbers.lamp), passes);
     let sky = sky_that(world, p, hit, numbers.sky, passes);
     lamp.into_iter().chain(sky)
@@ -109,8 +114,8 @@ fn sky_that<G: Geometry, L: Lights>(
     passes: Passes,
 ) -> impl Iterator<Item = DirectSample> {
     let n = match passes {
-        Passes::ByChance(_) if world.media.has_grids() => SKY_SAMPLES_IN_GRIDS,
-        _ => SKY_SAMPLES,
+        Passes::ByChance(_) => SKY_SAMPLES_IN_GRIDS,
+        Passes::AsItDoes => SKY_SAMPLES,
     };
     let spread = move |k: u32| {
         let u = (u + k as f32 / n as f32).fract();
