@@ -77,6 +77,7 @@ pub(super) fn asset() -> Asset {
         name: "cornell_box",
         ron: RON,
         gltf: Some(document),
+        volume: None,
     }
 }
 

@@ -63,6 +63,7 @@ pub(super) fn asset() -> Asset {
         name: "hall",
         ron: RON,
         gltf: Some(document),
+        volume: None,
     }
 }
 

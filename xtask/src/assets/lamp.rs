@@ -24,5 +24,6 @@ pub(super) fn asset() -> Asset {
         name: "lamp",
         ron: RON,
         gltf: None,
+        volume: None,
     }
 }

@@ -47,6 +47,7 @@ pub(super) fn asset() -> Asset {
         name: "street",
         ron: RON,
         gltf: Some(document),
+        volume: None,
     }
 }
 
