@@ -14,11 +14,13 @@ use tyndall_tests::image::Image;
 use tyndall_tests::program::workspace;
 
 /// Shipped scenes and the sizes of their thumbnails.
-const SCENES: [(&str, [u32; 2]); 4] = [
+const SCENES: [(&str, [u32; 2]); 6] = [
     ("cornell_box", [32, 32]),
     ("lamp", [32, 24]),
     ("hall", [40, 30]),
     ("street", [40, 30]),
+    ("smoke", [32, 32]),
+    ("cloud", [40, 25]),
 ];
 
 /// The integrators and their samples per pixel, which keep every golden under a few seconds.
