@@ -43,8 +43,8 @@ pub(crate) struct LightNumbers {
     pub(crate) lamp: [f32; 2],
     /// Directions to the sky.
     pub(crate) sky: [f32; 2],
-    /// Whether light comes through thick media.
-    pub(crate) depth: f32,
+    /// Whether light comes through thick media, where that is left to chance.
+    pub(crate) depth: Option<f32>,
 }
 
 /// Samples of [`lamps`] and [`sky`] together, for those who average many of them: light through thick smoke arrives by chance.
@@ -54,12 +54,7 @@ pub(crate) fn from_all<G: Geometry, L: Lights>(
     hit: Option<&SurfaceHit>,
     numbers: LightNumbers,
 ) -> impl Iterator<Item = DirectSample> {
-    // Where depth has a closed form chance would only add noise.
-    let passes = if world.media.has_grids() {
-        Passes::ByChance(numbers.depth)
-    } else {
-        Passes::AsItDoes
-    };
+    let passes = numbers.depth.map_or(Passes::AsItDoes, Passes::ByChance);
     let lamp = lamps_that(world, p, hit, (numbers.choice, numbers.lamp), passes);
     let sky = sky_that(world, p, hit, numbers.sky, passes);
     lamp.into_iter().chain(sky)

@@ -86,7 +86,8 @@ pub(super) fn walk<G: Geometry, L: Lights>(
             choice,
             lamp: light,
             sky: sampler.next_2d(),
-            depth: sampler.next_1d(),
+            // Where depth has a closed form chance would only add noise.
+            depth: world.media.has_grids().then(|| sampler.next_1d()),
         };
         let next = match (flight.sample(free), &hit) {
             (Some(t), _) => {
