@@ -14,13 +14,15 @@ use tyndall_tests::image::Image;
 use tyndall_tests::program::workspace;
 
 /// Shipped scenes: folder, name and the size of the thumbnail.
-const SCENES: [(&str, &str, [u32; 2]); 6] = [
+const SCENES: [(&str, &str, [u32; 2]); 8] = [
     ("cornell_box", "cornell_box", [32, 32]),
     ("cornell_box", "cornell_box_forward", [32, 32]),
     ("cornell_box", "cornell_box_backward", [32, 32]),
     ("lamp", "lamp", [32, 24]),
     ("hall", "hall", [40, 30]),
     ("street", "street", [40, 30]),
+    ("smoke", "smoke", [32, 32]),
+    ("cloud", "cloud", [40, 25]),
 ];
 
 /// The integrators and their samples per pixel, which keep every golden under a few seconds.

@@ -49,6 +49,12 @@ pub(crate) enum CliError {
         /// The output.
         path: std::path::PathBuf,
     },
+    /// Records for frames whose densities differ.
+    #[error(
+        "--cache-in and --cache-out keep the records of one density, and the volume files of this scene are a sequence with one for each \
+         frame; leave them out, or ask for one frame, as in --frames 7..8"
+    )]
+    CacheOfSequence,
     /// `tyndall info` was given a file of a kind it does not know.
     #[error(
         "cannot tell what {path} is: its name must end in .ron, .glb or .gltf (scenes), in .vdb or .vol (volumes), or in .exr, .png, .hdr or .jpg (images), unless it is a cache file"
@@ -74,6 +80,7 @@ impl CliError {
             | Self::Volume(_)
             | Self::Probe(_)
             | Self::OneFileForFrames { .. }
+            | Self::CacheOfSequence
             | Self::UnknownKind { .. }
             | Self::Overwrites { .. } => 2,
             Self::Render(error) if error.is_input() => 2,

@@ -6,7 +6,6 @@ mod args;
 mod commands;
 mod error;
 mod failure;
-mod numbered;
 mod output;
 mod progress;
 mod value;

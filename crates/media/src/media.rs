@@ -6,7 +6,7 @@ use crate::gradient::{self, EndGradients};
 use crate::hessian;
 use crate::line::Line;
 use crate::segment::depth;
-use crate::{Edges, Medium, MediumPoint, Region, Segment};
+use crate::{Density, Edges, Medium, MediumPoint, Region, Segment};
 use glam::{DVec3, Vec3};
 use tyndall_math::{Aabb, Jet, Ray};
 
@@ -32,6 +32,12 @@ impl Media {
         self.list.iter().all(Medium::is_vacuum)
     }
 
+    /// Whether any density is from voxels, so that optical depth takes a walk through these.
+    pub fn has_grids(&self) -> bool {
+        let mut densities = self.list.iter().map(Medium::density);
+        densities.any(|density| matches!(density, Density::Grid(_)))
+    }
+
     /// The media at point `p`.
     pub fn at(&self, p: Vec3) -> MediumPoint<'_> {
         let mut point = MediumPoint::empty(p);
@@ -45,7 +51,13 @@ impl Media {
 
     /// The media along `ray` from 0 to `t_max`, which may be infinite.
     pub fn segment(&self, ray: &Ray, t_max: f32) -> Segment<'_> {
-        Segment::new(&self.list, &ray.into(), t_max)
+        Segment::new(&self.list, &ray.into(), t_max, f32::INFINITY)
+    }
+
+    /// As [`Media::segment`], but it may end where its optical depth exceeds `enough` in every channel: in grids, what nobody asks for
+    /// need not be walked through.
+    pub fn segment_until(&self, ray: &Ray, t_max: f32, enough: f32) -> Segment<'_> {
+        Segment::new(&self.list, &ray.into(), t_max, enough)
     }
 
     /// Optical depth along `ray` from 0 to `t_max`, which may be infinite, for each channel.
@@ -53,13 +65,20 @@ impl Media {
     /// τ = Σ σt ∫ ρ dt over the media, each exact. May be infinite, never NaN: a channel without
     /// extinction is 0 over any distance. Transmittance is exp(−τ).
     pub fn optical_depth(&self, ray: &Ray, t_max: f32) -> Vec3 {
+        self.optical_depth_until(ray, t_max, f32::INFINITY)
+    }
+
+    /// As [`Media::optical_depth`], but where it exceeds `enough` in every channel it may be told too small, though not below that.
+    pub fn optical_depth_until(&self, ray: &Ray, t_max: f32, enough: f32) -> Vec3 {
         let line = Line::from(ray);
         let mut tau = Vec3::ZERO;
         for medium in &self.list {
             if !medium.is_vacuum()
                 && let Some((t0, t1)) = medium.region().clip_line(&line, t_max.into())
             {
-                tau += depth(medium.sigma_t(), medium.density().column_on(&line, t0, t1));
+                let enough = medium.column_of_depth(enough);
+                let column = medium.density().column_until(&line, t0, t1, enough);
+                tau += depth(medium.sigma_t(), column);
             }
         }
         tau

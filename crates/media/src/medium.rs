@@ -219,6 +219,13 @@ impl Medium {
         self.vacuum
     }
 
+    /// A column whose optical depth exceeds `depth` in all channels, rounding included; infinite where a channel has no extinction.
+    #[inline]
+    pub(crate) fn column_of_depth(&self, depth: f32) -> f64 {
+        const ROUNDING: f64 = 1e-5;
+        f64::from(depth) / f64::from(self.sigma_t().min_element()) * (1.0 + ROUNDING)
+    }
+
     /// A box around all of it, empty where there is nothing; `None` where it has no bounds.
     pub fn bounds(&self) -> Option<Aabb> {
         let of_grid = match self.density() {

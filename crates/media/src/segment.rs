@@ -26,15 +26,16 @@ struct Piece<'a> {
 }
 
 impl<'a> Piece<'a> {
-    /// The stretch of `line` up to `t_max` inside `medium`, where there is one that matters to light.
+    /// The stretch of `line` up to `t_max` inside `medium`, where there is one that matters to light; or up to a place behind that where its
+    /// optical depth is `enough` in all channels.
     #[inline]
-    fn new(medium: &'a Medium, line: &Line, t_max: f64) -> Option<Self> {
+    fn new(medium: &'a Medium, line: &Line, t_max: f64, enough: f32) -> Option<Self> {
         if medium.is_vacuum() {
             return None;
         }
         let (t0, t1) = medium.clip(line, t_max)?;
         let mut profile = medium.density().along(line);
-        profile.prepare(t0, t1);
+        let t1 = profile.prepare(t0, t1, medium.column_of_depth(enough));
         Some(Self {
             medium,
             profile,
@@ -58,6 +59,11 @@ impl<'a> Piece<'a> {
     #[inline]
     fn total(&self) -> Vec3 {
         depth(self.medium.sigma_t(), self.profile.column(self.t0, self.t1))
+    }
+
+    /// Whether the optical depth is `depth` in all channels, or more.
+    fn reaches(&self, depth: f32) -> bool {
+        self.total().min_element() >= depth
     }
 
     /// Whether the piece covers the stretch from `a` to `b`.
@@ -107,13 +113,24 @@ fn each_channel(tau: Vec3, f: impl Fn(f32) -> f32) -> Vec3 {
 const TOTAL_ROUNDING: f64 = 1e-6;
 
 impl<'a> Segment<'a> {
-    pub(crate) fn new(media: &'a [Medium], line: &Line, t_max: f32) -> Self {
+    pub(crate) fn new(media: &'a [Medium], line: &Line, t_max: f32, enough: f32) -> Self {
+        let t_max = f64::from(t_max);
+        let mut end = t_max;
         // A loop: `collect` into a `SmallVec` costs some hundred instructions even for one medium.
-        let mut pieces = SmallVec::new();
+        let mut pieces: SmallVec<[Piece<'a>; 4]> = SmallVec::new();
         for medium in media {
-            if let Some(piece) = Piece::new(medium, line, t_max.into()) {
+            if let Some(piece) = Piece::new(medium, line, end, enough) {
+                if piece.t1 < end && enough < f32::INFINITY && piece.reaches(enough) {
+                    end = piece.t1;
+                }
                 pieces.push(piece);
             }
+        }
+        if end < t_max {
+            pieces.retain(|piece| {
+                piece.t1 = piece.t1.min(end);
+                piece.t0 < end
+            });
         }
         Self { pieces }
     }

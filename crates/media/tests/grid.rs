@@ -436,4 +436,22 @@ proptest! {
         // Rounding of t to f32 where the density is at most 1.5, and of the sum.
         prop_assert!((back - tau).abs() <= 1.5 * f32::EPSILON * t + 2e-6 * tau, "{back} {tau}");
     }
+
+    #[test]
+    fn what_is_known_up_to_some_depth_is_known_as_well(
+        grid in any_grid(), a in any_point(), to in any_point(), enough in 0.01f32..4.0, share in 0.0f32..1.0,
+    ) {
+        let media = medium(Region::Everywhere, grid);
+        let ray = Ray::new(a.as_vec3(), (to - a).normalize().as_vec3());
+        let (whole, part) = (media.optical_depth(&ray, 20.0).x, media.optical_depth_until(&ray, 20.0, enough).x);
+        prop_assert!(part == whole || (enough < part && part < whole), "{part} of {whole}, {enough} asked for");
+        let (all, cut) = (media.segment(&ray, 20.0), media.segment_until(&ray, 20.0, enough));
+        prop_assert!(cut.total().x == all.total().x || cut.total().x > enough);
+        let tau = enough * share;
+        prop_assert_eq!(cut.distance_at(0, tau), all.distance_at(0, tau));
+        let t = 20.0 * share;
+        if all.optical_depth(t).x < enough {
+            prop_assert_eq!(cut.optical_depth(t), all.optical_depth(t));
+        }
+    }
 }

@@ -11,6 +11,7 @@ use crate::grids::GridFiles;
 use crate::lights::{EnvironmentLight, Light, LightSet, SkyLight, read_environment};
 use crate::load::{Fog, LoadOptions};
 use crate::motion::CameraMotion;
+use crate::numbered::{has_place, numbered};
 use crate::paths::{Folder, PathError};
 use crate::scene::{RenderSettings, Scene};
 use crate::scene_file::{self, Place, SceneFile, numbers};
@@ -32,6 +33,8 @@ pub(crate) struct Assembly<'a> {
     pub(crate) warnings: Vec<Warning>,
     /// The files read so far.
     pub(crate) files: Vec<PathBuf>,
+    /// Whether other frames have other volume files.
+    pub(crate) is_sequence: bool,
 }
 
 impl Assembly<'_> {
@@ -77,6 +80,7 @@ impl Assembly<'_> {
             media,
             bounds,
             definition: digest::definition(file, self.options),
+            is_sequence: self.is_sequence,
             own_files: usize::from(!self.text.is_empty()),
             warnings: self.warnings,
             files: self.files,
@@ -199,7 +203,10 @@ impl Assembly<'_> {
         field: &str,
         grids: &mut GridFiles,
     ) -> Result<Density, SceneError> {
-        let (file, _) = self.locate(&grid.file, &format!("{field}.file"))?;
+        let name = Path::new(&grid.file);
+        self.is_sequence |= has_place(name);
+        let name = numbered(name, self.options.frame.unwrap_or(0));
+        let (file, _) = self.locate(&name.to_string_lossy(), &format!("{field}.file"))?;
         let limit = self.options.max_grid_bytes;
         let (grid, warning) = grids
             .grid(grid, &file, limit)

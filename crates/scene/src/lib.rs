@@ -52,6 +52,7 @@ pub mod load;
 pub mod material;
 pub mod mesh;
 pub mod motion;
+pub mod numbered;
 pub mod paths;
 pub mod scene;
 pub mod scene_file;

@@ -20,6 +20,8 @@ pub struct LoadOptions {
     pub bare_gltf: bool,
     /// Memory that one density grid may take, in bytes; where left out, [`DEFAULT_MEMORY`](crate::volume_file::DEFAULT_MEMORY).
     pub max_grid_bytes: Option<u64>,
+    /// The frame whose volume files to read, where these are a sequence; where left out, frame 0.
+    pub frame: Option<u32>,
     /// Pixels from left to right, instead of the scene's.
     pub width: Option<u32>,
     /// Pixels from top to bottom, instead of the scene's.
@@ -73,6 +75,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
                 options,
                 warnings: Vec::new(),
                 files: Vec::new(),
+                is_sequence: false,
             }
             .assemble(&SceneFile::default(), gltf)
         }
@@ -97,6 +100,7 @@ fn load_bytes(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene,
         options,
         warnings: Vec::new(),
         files: vec![path.into()],
+        is_sequence: false,
     };
     let gltf = assembly.read_gltf(&file)?;
     assembly.assemble(&file, gltf)

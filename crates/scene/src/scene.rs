@@ -36,6 +36,8 @@ pub struct Scene {
     pub warnings: Vec<Warning>,
     /// The files that the scene was read from.
     pub files: Vec<PathBuf>,
+    /// Whether its volume files are those of one frame, see [`LoadOptions::frame`](crate::LoadOptions::frame).
+    pub is_sequence: bool,
     /// What the scene file says of lights and media; see [`Scene::digest`].
     pub(crate) definition: String,
     /// How many of the first files are the scene file itself: one, or none for a bare glTF file.

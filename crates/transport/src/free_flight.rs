@@ -6,7 +6,7 @@
 use crate::world::{Geometry, SurfaceHit, World};
 use glam::Vec3;
 use tyndall_math::Ray;
-use tyndall_media::{Segment, absorptance, transmittance};
+use tyndall_media::{Media, Segment, absorptance, transmittance};
 
 /// Samples scattering distances on a [`Segment`] in proportion to σt T.
 #[derive(Clone, Debug)]
@@ -51,6 +51,15 @@ impl<'m> FreeFlight<'m> {
             stopped: absorptance(total),
             segment,
         }
+    }
+
+    /// As [`FreeFlight::new`] for a ray of which no more is asked than [`FreeFlight::sample`] with the number `u`, and what follows from it:
+    /// it is known as far as that flight gets.
+    pub fn for_one(media: &'m Media, ray: &Ray, t_max: f32, throughput: Vec3, u: f32) -> Self {
+        // The larger of what the number means where channels are alike and where one is picked.
+        let (_, rest) = pick(throughput / throughput.element_sum(), u);
+        let enough = -(-u.max(rest)).ln_1p();
+        Self::new(media.segment_until(ray, t_max, enough), throughput)
     }
 
     /// The surface that `ray` meets, and flights up to it of a path that all channels follow alike.

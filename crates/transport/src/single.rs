@@ -290,6 +290,30 @@ pub fn unoccluded<G: Geometry, L>(
     p: Vec3,
     light: &LightSample,
 ) -> Option<Vec3> {
+    passing(world, origin, p, light, Passes::AsItDoes)
+}
+
+/// How light passes through media.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Passes {
+    /// Attenuated by all of them.
+    AsItDoes,
+    /// Attenuated down to 1/e and from there on all or none, by a number in [0, 1): right on average, and in thick smoke most ways need not
+    /// be followed to their ends.
+    ByChance(f32),
+}
+
+/// Optical depth behind which light passes by chance.
+const CHANCE_DEPTH: f32 = 1.0;
+
+/// As [`unoccluded`], of light that passes through media as said.
+pub(crate) fn passing<G: Geometry, L>(
+    world: &World<'_, G, L>,
+    origin: Vec3,
+    p: Vec3,
+    light: &LightSample,
+    passes: Passes,
+) -> Option<Vec3> {
     let (ray, distance) = shadow_ray(origin, p, light)?;
     if world.geometry.occluded(&ray, distance) {
         return None;
@@ -297,7 +321,16 @@ pub fn unoccluded<G: Geometry, L>(
     if world.media.is_empty() {
         return Some(Vec3::ONE);
     }
-    Some(transmittance(world.media.optical_depth(&ray, distance)))
+    match passes {
+        Passes::AsItDoes => Some(transmittance(world.media.optical_depth(&ray, distance))),
+        Passes::ByChance(u) => {
+            let end = CHANCE_DEPTH - (-u).ln_1p();
+            let tau = world.media.optical_depth_until(&ray, distance, end);
+            // By the clearest channel, so that the others are attenuated further.
+            let beyond = (tau.min_element() - CHANCE_DEPTH).max(0.0);
+            (beyond + CHANCE_DEPTH < end).then(|| transmittance(tau - beyond))
+        }
+    }
 }
 
 /// The ray from `origin` to the light that `light` samples from `p`, and how far surfaces on it count.

@@ -81,6 +81,7 @@ pub(super) fn asset() -> Asset {
             ("cornell_box_forward", scattering(0.7)),
             ("cornell_box_backward", scattering(-0.4)),
         ],
+        volume: None,
     }
 }
 

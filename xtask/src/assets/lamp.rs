@@ -25,5 +25,6 @@ pub(super) fn asset() -> Asset {
         ron: RON.to_owned(),
         gltf: None,
         variants: Vec::new(),
+        volume: None,
     }
 }

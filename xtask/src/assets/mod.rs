@@ -1,12 +1,15 @@
 //! `cargo xtask assets`: the scenes that Tyndall ships, written from code. The same files come out on every run; a test
 //! holds the committed ones against them.
 
+mod cloud;
 mod cornell_box;
 mod gltf;
 mod hall;
 mod lamp;
 mod mesh;
+mod smoke;
 mod street;
+mod volume;
 
 use crate::cargo::workspace;
 use anyhow::{Context, Result};
@@ -14,13 +17,14 @@ use gltf::Document;
 use std::fs;
 use std::path::PathBuf;
 
-/// One scene: `assets/<name>/<name>.ron`, with its glTF beside it where it has geometry.
+/// One scene: `assets/<name>/<name>.ron`, with its glTF beside it where it has geometry, and a `.vol` where its density is from voxels.
 struct Asset {
     name: &'static str,
     ron: String,
     gltf: Option<Document>,
     /// Further scene files of the same geometry, `assets/<name>/<variant>.ron`.
     variants: Vec<(&'static str, String)>,
+    volume: Option<Vec<u8>>,
 }
 
 pub(crate) fn run() -> Result<()> {
@@ -41,6 +45,8 @@ fn files() -> Result<Vec<(PathBuf, Vec<u8>)>> {
         lamp::asset(),
         hall::asset(),
         street::asset(),
+        smoke::asset(),
+        cloud::asset(),
     ] {
         let stem = PathBuf::from("assets").join(asset.name).join(asset.name);
         files.push((stem.with_extension("ron"), asset.ron.into()));
@@ -54,6 +60,9 @@ fn files() -> Result<Vec<(PathBuf, Vec<u8>)>> {
             let bin = format!("{}.bin", asset.name);
             files.push((stem.with_extension("gltf"), document.json(&bin)?));
             files.push((stem.with_extension("bin"), document.into_buffer()));
+        }
+        if let Some(volume) = asset.volume {
+            files.push((stem.with_extension("vol"), volume));
         }
     }
     Ok(files)

@@ -49,6 +49,7 @@ pub(super) fn asset() -> Asset {
         ron: RON.to_owned(),
         gltf: Some(document),
         variants: Vec::new(),
+        volume: None,
     }
 }
 

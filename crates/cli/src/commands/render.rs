@@ -2,7 +2,6 @@
 
 use crate::args::RenderArgs;
 use crate::error::CliError;
-use crate::numbered::{has_place, numbered};
 use crate::output;
 use crate::progress::Bar;
 use std::collections::HashSet;
@@ -14,6 +13,7 @@ use tyndall_render::image_file::{
 use tyndall_render::options::RenderOptions;
 use tyndall_render::{Outcome, Renderer};
 use tyndall_scene::camera::Camera;
+use tyndall_scene::numbered::{has_place, numbered};
 use tyndall_scene::{LoadOptions, Scene};
 
 pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
@@ -29,7 +29,17 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     for path in numbers.chain(&args.cache_out) {
         check_place(path)?;
     }
-    let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
+    let load = |job: &Job| {
+        let options = LoadOptions {
+            frame: job.number,
+            ..load_options(args)
+        };
+        tyndall_scene::load(&args.scene, &options)
+    };
+    let [first, others @ ..] = jobs.as_slice() else {
+        return Ok(());
+    };
+    let scene = load(first)?;
     // Records may go back where they came from.
     let read = args.cache_in.as_ref();
     let read = read.and_then(|path| path.canonicalize().ok());
@@ -51,16 +61,39 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
             "a PNG file shows the colour of the image alone; --layers takes effect in .exr files",
         ]);
     }
-    let load_s = start.elapsed().as_secs_f64();
+    if !scene.is_sequence || others.is_empty() {
+        return render_jobs(args, &options, &scene, &jobs, start);
+    }
+    if args.cache_in.is_some() || args.cache_out.is_some() {
+        return Err(CliError::CacheOfSequence);
+    }
+    render_jobs(args, &options, &scene, std::slice::from_ref(first), start)?;
+    drop(scene);
+    for job in others {
+        let start = Instant::now();
+        let scene = load(job)?;
+        render_jobs(args, &options, &scene, std::slice::from_ref(job), start)?;
+    }
+    Ok(())
+}
 
+/// Makes images of one scene, which share their records; `start` is when its loading began.
+fn render_jobs(
+    args: &RenderArgs,
+    options: &RenderOptions,
+    scene: &Scene,
+    jobs: &[Job],
+    start: Instant,
+) -> Result<(), CliError> {
+    let load_s = start.elapsed().as_secs_f64();
     let bar = Bar::new(args.quiet);
-    let mut renderer = Renderer::new(&scene, &options, &bar)?;
+    let mut renderer = Renderer::new(scene, options, &bar)?;
     if let Some(path) = &args.cache_in {
         renderer.read_cache(path)?;
     }
     let cameras: Vec<Camera> = jobs
         .iter()
-        .map(|job| camera(&scene, job))
+        .map(|job| camera(scene, job))
         .collect::<Result<_, CliError>>()?;
     if args.fill_only || args.frames.is_some() || args.cache_out.is_some() {
         renderer.fill(&cameras);
@@ -82,11 +115,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     }
     let mut since = start;
     for (job, camera) in jobs.iter().zip(&cameras) {
-        let outcome = renderer.render(camera, job.number.unwrap_or(0));
+        // What stands still in a sequence of densities shall look still: its noise, too.
+        let number = job.number.filter(|_| !scene.is_sequence);
+        let outcome = renderer.render(camera, number.unwrap_or(0));
         bar.finish();
         let mut outcome = outcome?;
         outcome.stats.load_s = if since == start { load_s } else { 0.0 };
-        finish(args, &scene, job, &mut outcome, since)?;
+        finish(args, scene, job, &mut outcome, since)?;
         since = Instant::now();
     }
     Ok(())

@@ -119,6 +119,12 @@ impl Density {
     /// ∫ density dt along `line` from `t0` to `t1 ≥ t0`.
     #[inline]
     pub(crate) fn column_on(&self, line: &Line, t0: f64, t1: f64) -> f64 {
+        self.column_until(line, t0, t1, f64::INFINITY)
+    }
+
+    /// ∫ density dt along `line` from `t0` to `t1 ≥ t0`; where it exceeds `enough`, perhaps only a part of it that does, too.
+    #[inline]
+    pub(crate) fn column_until(&self, line: &Line, t0: f64, t1: f64, enough: f64) -> f64 {
         match *self {
             // Never 0 · ∞.
             Self::Constant(0.0) => 0.0,
@@ -126,7 +132,7 @@ impl Density {
             Self::Height { base, scale_height } => {
                 HeightProfile::new(base, scale_height, line).column(t0, t1)
             }
-            Self::Grid(ref grid) => grid.column(line, t0, t1),
+            Self::Grid(ref grid) => grid.column_until(line, t0, t1, enough),
         }
     }
 
@@ -153,11 +159,13 @@ pub(crate) enum Profile<'a> {
 }
 
 impl Profile<'_> {
-    /// Prepares for many questions about the distances from `t0` to `t1`.
+    /// Prepares for many questions about the distances from `t0` to `t1`, or to a place behind that where the column is `enough`. Tells
+    /// where that is.
     #[inline]
-    pub(crate) fn prepare(&mut self, t0: f64, t1: f64) {
-        if let Self::Grid(grid) = self {
-            grid.tabulate(t0, t1);
+    pub(crate) fn prepare(&mut self, t0: f64, t1: f64, enough: f64) -> f64 {
+        match self {
+            Self::Grid(grid) => grid.tabulate(t0, t1, enough),
+            Self::Constant(_) | Self::Height(_) => t1,
         }
     }
 

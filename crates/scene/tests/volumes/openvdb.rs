@@ -354,6 +354,26 @@ fn trees_with_two_blocks_in_one_place_or_blocks_beside_the_lattice_are_refused()
 }
 
 #[test]
+fn sparse_voxels_take_little_more_memory_than_active_ones_hold() {
+    // In each corner of 512³ voxels a cube of 32³ different ones.
+    let mut voxels = Vec::new();
+    for corner in 0..8 {
+        let corner = IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2) * 448;
+        for i in 0..32 * 32 * 32 {
+            let voxel = corner + IVec3::new(i >> 10, i >> 5 & 31, i & 31);
+            voxels.push((voxel, 0.5 + (i % 7) as f32));
+        }
+    }
+    let active = size_of::<f32>() * voxels.len();
+    let volume = read_one(Grid {
+        voxels,
+        ..Grid::default()
+    });
+    let bytes = volume.built.voxels.bytes();
+    assert!(10 * bytes <= 13 * active, "{bytes} for {active}");
+}
+
+#[test]
 fn small_files_that_claim_huge_grids_are_cheap_or_refused() {
     // 65536³ voxels in 4096 tiles take a table of 16 MiB.
     let tiles: Vec<_> = (0..4096)

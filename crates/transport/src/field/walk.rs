@@ -77,13 +77,23 @@ pub(super) fn walk<G: Geometry, L: Lights>(
         let t_max = hit.map_or(f32::INFINITY, |h| h.t);
         // No channel is left out: vertices to come count all of them.
         let steer = throughput.max(Vec3::splat(LEAST_CHANNEL * throughput.max_element()));
-        let flight = FreeFlight::new(world.media.segment(&ray, t_max), steer);
+        let flight = if world.media.emits() {
+            FreeFlight::new(world.media.segment(&ray, t_max), steer)
+        } else {
+            FreeFlight::for_one(world.media, &ray, t_max, steer, free)
+        };
         let emitted =
             emission::sample(world, &ray, &flight, emission).map_or(Vec3::ZERO, |e| e.value);
         let w_o = -ray.direction;
         let light = sampler.next_2d();
         let direction = sampler.next_2d();
-        let lights = (choice, light, sampler.next_2d());
+        let lights = LightNumbers {
+            choice,
+            lamp: light,
+            sky: sampler.next_2d(),
+            // Where depth has a closed form chance would only add noise.
+            depth: world.media.has_grids().then(|| sampler.next_1d()),
+        };
         let next = match (flight.sample(free), &hit) {
             (Some(t), _) => {
                 let stop = flight.stop(t);
@@ -232,7 +242,8 @@ fn on_surface<G: Geometry, L: Lights>(
     let gloss = if bsdf.is_lambert() { 0.0 } else { 0.5 };
     let w_i = if u < gloss {
         // The number that chose the light may choose the lobe: the two ways of light only add up.
-        bsdf.sample(w_o, lights.0, [u / gloss, v]).map(|s| s.w_i)
+        bsdf.sample(w_o, lights.choice, [u / gloss, v])
+            .map(|s| s.w_i)
     } else {
         let u = ((u - gloss) / (1.0 - gloss)).min(1.0 - f32::EPSILON);
         let local = warp::cosine_hemisphere([u, v]);

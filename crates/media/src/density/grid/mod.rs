@@ -226,13 +226,14 @@ impl Grid {
         (t0 < t1).then_some((t0, t1))
     }
 
-    /// ∫ density dt along a line from `t0` to `t1`.
+    /// ∫ density dt along a line from `t0` to `t1`, or any part of it that exceeds `enough`.
     ///
     /// Not inlined, so that rays through other media need not make room for it.
     #[inline(never)]
-    pub(crate) fn column(&self, line: &Line, t0: f64, t1: f64) -> f64 {
-        self.clip(line, t0, t1)
-            .map_or(0.0, |(t0, t1)| GridProfile::new(self, line).column(t0, t1))
+    pub(crate) fn column_until(&self, line: &Line, t0: f64, t1: f64, enough: f64) -> f64 {
+        self.clip(line, t0, t1).map_or(0.0, |(t0, t1)| {
+            GridProfile::new(self, line).column_until(t0, t1, enough)
+        })
     }
 
     /// How far, in metres, a point near the faces of the box around the grid is from the nearest, and that face's outward unit normal.

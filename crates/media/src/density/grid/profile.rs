@@ -41,20 +41,28 @@ impl<'a> GridProfile<'a> {
         }
     }
 
-    /// Makes a table of the columns from `t0` to `t1`: questions about distances between then march a few cells only.
-    pub(crate) fn tabulate(&mut self, t0: f64, t1: f64) {
+    /// Makes a table of the columns from `t0` to `t1`, or to where the column exceeds `enough`: questions about distances between then
+    /// march a few cells only. Tells where the table ends.
+    pub(crate) fn tabulate(&mut self, t0: f64, t1: f64, enough: f64) -> f64 {
+        let enough = enough / self.scale();
         let mut table = vec![Knot { t: t0, column: 0.0 }];
-        let (mut column, mut steps) = (0.0, 0);
-        let _: ControlFlow<()> = self.walk(t0, t1, |step| {
+        let (mut column, mut steps, mut end) = (0.0, 0, t1);
+        let _ = self.walk(t0, t1, |step| {
             column += step.column();
             steps += 1;
-            if steps == STEPS_PER_KNOT || step.t1 >= t1 {
+            let is_last = step.t1 >= t1 || column > enough;
+            if steps == STEPS_PER_KNOT || is_last {
                 table.push(Knot { t: step.t1, column });
                 steps = 0;
+            }
+            if is_last {
+                end = step.t1;
+                return ControlFlow::Break(());
             }
             ControlFlow::Continue(())
         });
         self.table = table;
+        end
     }
 
     #[inline]
@@ -108,10 +116,22 @@ impl<'a> GridProfile<'a> {
     }
 
     fn march(&self, t0: f64, t1: f64) -> f64 {
+        self.march_until(t0, t1, f64::INFINITY)
+    }
+
+    /// The column from `t0` to `t1`, or any part of it that exceeds `enough`.
+    pub(crate) fn column_until(&self, t0: f64, t1: f64, enough: f64) -> f64 {
+        self.march_until(t0, t1, enough / self.scale()) * self.scale()
+    }
+
+    fn march_until(&self, t0: f64, t1: f64, enough: f64) -> f64 {
         let mut column = 0.0;
         if t0 < t1 {
-            let _: ControlFlow<()> = self.walk(t0, t1, |step| {
+            let _ = self.walk(t0, t1, |step| {
                 column += step.column();
+                if column > enough {
+                    return ControlFlow::Break(());
+                }
                 ControlFlow::Continue(())
             });
         }

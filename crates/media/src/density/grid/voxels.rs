@@ -2,7 +2,7 @@
 //!
 //! A tree of three levels over blocks of 512³, 64³ and 8³ voxels, all aligned to multiples of their size: a table of the
 //! blocks of 512³ between the first and the last used one, and nodes of 8³ entries below. An entry is a tile, a node or a brick.
-//! Beside the 2 KiB of a brick a node of 4 KiB for up to 512 bricks weighs nothing.
+//! Beside the 2 KiB of a brick a node of 4 KiB for up to 512 bricks and 56 bytes about its neighbours weigh little.
 
 use glam::IVec3;
 use std::fmt;
@@ -24,7 +24,7 @@ pub const MAX_COORDINATE: i32 = 1 << 30;
 const MAX_ROOT_BLOCKS: i64 = 1 << 22;
 
 /// Binary logarithms of the sizes of blocks at the three levels.
-const BRICK_LOG2: u32 = 3;
+pub(super) const BRICK_LOG2: u32 = 3;
 const NODE_LOG2: u32 = 6;
 const ROOT_LOG2: u32 = 9;
 
@@ -50,8 +50,19 @@ pub struct Voxels {
     root: Vec<Entry>,
     nodes: Vec<[Entry; BRICK_VOXELS]>,
     bricks: Vec<Brick>,
+    /// For each brick what lies above it on some of the axes: cells there are a third of all, and need no way through the tree.
+    above: Vec<[Above; 7]>,
     max: f32,
     support: Option<[IVec3; 2]>,
+}
+
+/// The block of 8³ voxels that touches a brick on the side of larger coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Above {
+    /// All voxels alike.
+    Tile(f32),
+    /// A brick.
+    Brick(u32),
 }
 
 /// The largest known block around a voxel.
@@ -60,7 +71,69 @@ pub(super) enum Block<'a> {
     /// All voxels alike in an aligned block of 2^`log2` voxels on each axis.
     Tile { value: f32, log2: u32 },
     /// A brick.
-    Brick(&'a Brick),
+    Brick(BrickRef<'a>),
+}
+
+/// A brick among its neighbours.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BrickRef<'a> {
+    voxels: &'a Voxels,
+    values: &'a Brick,
+    index: u32,
+}
+
+impl BrickRef<'_> {
+    /// The value of a voxel that the brick holds.
+    #[inline]
+    pub(super) fn value(&self, voxel: IVec3) -> f32 {
+        self.values[in_brick(voxel)]
+    }
+
+    /// The values at the corners of a cell whose first corner the brick holds; the bits of the index are the offsets in x, y and z.
+    #[inline]
+    pub(super) fn corners(&self, cell: IVec3) -> [f32; 8] {
+        let local = cell & (BRICK_SIDE - 1);
+        if local.max_element() < BRICK_SIDE - 1 {
+            let first = in_brick(cell);
+            // The largest index, 73 above the first; the mask says that it is inside.
+            let corner = |offset: usize| self.values[(first + offset) & (BRICK_VOXELS - 1)];
+            [
+                corner(0),
+                corner(64),
+                corner(8),
+                corner(72),
+                corner(1),
+                corner(65),
+                corner(9),
+                corner(73),
+            ]
+        } else {
+            self.corners_across(local)
+        }
+    }
+
+    /// The same for a cell between this brick and those above it.
+    fn corners_across(&self, local: IVec3) -> [f32; 8] {
+        let above = &self.voxels.above[self.index as usize];
+        let across = local.cmpeq(IVec3::splat(BRICK_SIDE - 1)).bitmask() as usize;
+        let (first, next) = (local, (local + 1) & (BRICK_SIDE - 1));
+        let x = [first.x << 6, next.x << 6];
+        let y = [first.y << 3, next.y << 3];
+        let z = [first.z, next.z];
+        let mut corners = [0.0; 8];
+        for (corner, value) in corners.iter_mut().enumerate() {
+            let place = x[corner & 1] | y[corner >> 1 & 1] | z[corner >> 2];
+            let place = place as usize & (BRICK_VOXELS - 1);
+            *value = match corner & across {
+                0 => self.values[place],
+                side => match above[side - 1] {
+                    Above::Tile(value) => value,
+                    Above::Brick(index) => self.voxels.bricks[index as usize][place],
+                },
+            };
+        }
+        corners
+    }
 }
 
 /// Why voxels cannot be stored.
@@ -122,6 +195,8 @@ pub struct BuiltVoxels {
 #[derive(Clone, Debug)]
 pub struct VoxelsBuilder {
     voxels: Voxels,
+    /// Where each brick lies.
+    places: Vec<IVec3>,
     n_negative: u64,
     non_finite: Option<(u64, IVec3)>,
 }
@@ -150,7 +225,8 @@ impl VoxelsBuilder {
         if n_root > i128::from(MAX_ROOT_BLOCKS) {
             return Err(extent);
         }
-        let of_bricks = (n_bricks as u64).saturating_mul(size_of::<Brick>() as u64);
+        let each = size_of::<Brick>() + size_of::<[Above; 7]>() + size_of::<IVec3>();
+        let of_bricks = (n_bricks as u64).saturating_mul(each as u64);
         let needed = of_bricks.saturating_add(n_root as u64 * size_of::<Entry>() as u64);
         if needed > limit {
             return Err(VoxelsError::Memory { needed, limit });
@@ -163,9 +239,11 @@ impl VoxelsBuilder {
                 root: Vec::new(),
                 nodes: Vec::new(),
                 bricks: Vec::with_capacity(n_bricks),
+                above: Vec::new(),
                 max: 0.0,
                 support: None,
             },
+            places: Vec::with_capacity(n_bricks),
             n_negative: 0,
             non_finite: None,
         };
@@ -237,6 +315,7 @@ impl VoxelsBuilder {
         if let Some(entry) = self.entry(min, BRICK_LOG2) {
             *entry = Entry::Brick(index);
             self.voxels.bricks.push(brick);
+            self.places.push(min);
         }
     }
 
@@ -250,6 +329,18 @@ impl VoxelsBuilder {
         }
         self.voxels.bricks.shrink_to_fit();
         self.voxels.nodes.shrink_to_fit();
+        let voxels = &self.voxels;
+        let above = |place: &IVec3| {
+            std::array::from_fn(|side| {
+                let side = side as i32 + 1;
+                let step = IVec3::new(side & 1, side >> 1 & 1, side >> 2);
+                match voxels.block(place + step * BRICK_SIDE) {
+                    Block::Tile { value, .. } => Above::Tile(value),
+                    Block::Brick(brick) => Above::Brick(brick.index),
+                }
+            })
+        };
+        self.voxels.above = self.places.iter().map(above).collect();
         Ok(BuiltVoxels {
             voxels: self.voxels,
             n_negative: self.n_negative,
@@ -340,6 +431,7 @@ impl Voxels {
             + self.root.capacity() * size_of::<Entry>()
             + self.nodes.capacity() * size_of::<[Entry; BRICK_VOXELS]>()
             + self.bricks.capacity() * size_of::<Brick>()
+            + self.above.capacity() * size_of::<[Above; 7]>()
     }
 
     /// The value of a voxel.
@@ -347,7 +439,7 @@ impl Voxels {
     pub fn value(&self, voxel: IVec3) -> f32 {
         match self.block(voxel) {
             Block::Tile { value, .. } => value,
-            Block::Brick(brick) => brick[in_brick(voxel)],
+            Block::Brick(brick) => brick.value(voxel),
         }
     }
 
@@ -364,7 +456,13 @@ impl Voxels {
         loop {
             match entry {
                 Entry::Tile(value) => return Block::Tile { value, log2 },
-                Entry::Brick(index) => return Block::Brick(&self.bricks[index as usize]),
+                Entry::Brick(index) => {
+                    return Block::Brick(BrickRef {
+                        voxels: self,
+                        values: &self.bricks[index as usize],
+                        index,
+                    });
+                }
                 Entry::Node(node) => {
                     log2 -= BRICK_LOG2;
                     entry = self.nodes[node as usize][slot(voxel, log2)];
@@ -388,7 +486,7 @@ impl Voxels {
 
 /// Place of a voxel in its brick.
 #[inline]
-pub(super) fn in_brick(voxel: IVec3) -> usize {
+fn in_brick(voxel: IVec3) -> usize {
     let [x, y, z] = (voxel & 7).to_array();
     (x << 6 | y << 3 | z) as usize
 }
@@ -500,7 +598,7 @@ mod tests {
         let new = |bounds: [[i32; 3]; 2], n| {
             VoxelsBuilder::new(0.0, bounds.map(IVec3::from), n, 1 << 20).map(|_| ())
         };
-        assert_eq!(new([[0; 3], [511; 3]], 500), Ok(()));
+        assert_eq!(new([[0; 3], [511; 3]], 480), Ok(()));
         assert!(matches!(
             new([[0; 3], [511; 3]], 600),
             Err(VoxelsError::Memory { .. })

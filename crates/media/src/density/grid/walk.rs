@@ -6,7 +6,7 @@
 //! if these are.
 
 use super::cell::Cell;
-use super::voxels::{BRICK_SIDE, Block, Voxels, in_brick};
+use super::voxels::{BRICK_LOG2, BRICK_SIDE, Block, BrickRef, Voxels};
 use crate::line::Line;
 use crate::region::clip_box;
 use glam::{DVec3, IVec3};
@@ -50,29 +50,14 @@ impl Step {
 /// The values at the corners of a cell.
 #[inline]
 pub(super) fn corners(voxels: &Voxels, cell: IVec3) -> [f32; 8] {
-    if let Block::Brick(brick) = voxels.block(cell)
-        && is_within(cell)
-    {
-        return corners_in(brick, in_brick(cell));
+    match voxels.block(cell) {
+        Block::Brick(brick) => brick.corners(cell),
+        Block::Tile { .. } => corners_at_tile(voxels, cell),
     }
-    corners_across(voxels, cell)
 }
 
-/// Whether all corners of a cell lie in the brick of its first.
-#[inline]
-fn is_within(cell: IVec3) -> bool {
-    (cell & (BRICK_SIDE - 1)).max_element() < BRICK_SIDE - 1
-}
-
-#[inline]
-fn corners_in(brick: &[f32; 512], first: usize) -> [f32; 8] {
-    // The largest index, 73 above the first; the mask says that it is inside.
-    let first = first & 511;
-    [0, 64, 8, 72, 1, 65, 9, 73].map(|offset| brick[(first + offset) & 511])
-}
-
-/// The same for cells between blocks: two to eight of these, each looked up once.
-fn corners_across(voxels: &Voxels, cell: IVec3) -> [f32; 8] {
+/// The same for a cell whose first corner lies in a tile, and others perhaps in blocks above it: each of these is looked up once.
+fn corners_at_tile(voxels: &Voxels, cell: IVec3) -> [f32; 8] {
     // The axes on which the cell lies between blocks of 8³.
     let across = (cell & (BRICK_SIDE - 1)).cmpeq(IVec3::splat(BRICK_SIDE - 1));
     let across = across.bitmask() as i32;
@@ -84,7 +69,7 @@ fn corners_across(voxels: &Voxels, cell: IVec3) -> [f32; 8] {
             if corner & across == side {
                 *value = match block {
                     Block::Tile { value, .. } => value,
-                    Block::Brick(brick) => brick[in_brick(cell + offset(corner))],
+                    Block::Brick(brick) => brick.value(cell + offset(corner)),
                 };
             }
         }
@@ -228,26 +213,23 @@ impl<'a> Walker<'a> {
         let mut cell = self.cell(t0);
         let mut t = t0;
         loop {
-            let block = self.voxels.block(cell);
-            let uniform = match block {
-                Block::Tile { value, log2 } => uniform_cells(self.voxels, cell, value, log2)
-                    .map(|cells| (cells, f64::from(value))),
-                Block::Brick(_) => None,
+            let (value, log2) = match self.voxels.block(cell) {
+                Block::Tile { value, log2 } => (value, log2),
+                Block::Brick(brick) => {
+                    if !self.through_brick(brick, (&mut cell, &mut t), t1, visit)? {
+                        return ControlFlow::Continue(());
+                    }
+                    continue;
+                }
             };
-            let [low, high] = uniform.map_or([cell, cell + 1], |(cells, _)| cells);
+            let uniform = uniform_cells(self.voxels, cell, value, log2);
+            let [low, high] = uniform.unwrap_or([cell, cell + 1]);
             let (exit, axis) = self.exit(low, high);
             let end = exit.min(t1).max(t);
-            let run = match (uniform, block) {
-                (Some((_, value)), _) => Run::Uniform(value),
-                (None, block) => Run::Cell(Cell {
-                    corners: match block {
-                        Block::Brick(brick) if is_within(cell) => corners_in(brick, in_brick(cell)),
-                        _ => corners_across(self.voxels, cell),
-                    },
-                    start: self.line.at(t) - cell.as_dvec3(),
-                    direction: self.line.direction,
-                    length: end - t,
-                }),
+            let run = if uniform.is_some() {
+                Run::Uniform(value.into())
+            } else {
+                self.run(corners_at_tile(self.voxels, cell), cell, (t, end))
             };
             visit(&Step {
                 t0: t,
@@ -269,6 +251,73 @@ impl<'a> Walker<'a> {
             } else {
                 low[axis] - 1
             };
+        }
+    }
+
+    #[inline]
+    fn run(&self, corners: [f32; 8], cell: IVec3, (t, end): (f64, f64)) -> Run {
+        Run::Cell(Cell {
+            corners,
+            start: self.line.at(t) - cell.as_dvec3(),
+            direction: self.line.direction,
+            length: end - t,
+        })
+    }
+
+    /// The cells of one brick, from `cell` at distance `t` on, which are moved to what comes behind it; false where the line ends in it.
+    ///
+    /// The brick is looked up once, and a step computes the distance to one face anew instead of three.
+    #[inline]
+    fn through_brick<B>(
+        &self,
+        brick: BrickRef<'_>,
+        (cell, t): (&mut IVec3, &mut f64),
+        t1: f64,
+        visit: &mut impl FnMut(&Step) -> ControlFlow<B>,
+    ) -> ControlFlow<B, bool> {
+        let d = self.line.direction;
+        let (origin, per_voxel) = (self.line.origin.to_array(), self.per_voxel.to_array());
+        let forward = d.cmpgt(DVec3::ZERO);
+        let step = IVec3::select(forward, IVec3::ONE, IVec3::NEG_ONE).to_array();
+        let ahead = IVec3::select(forward, IVec3::ONE, IVec3::ZERO).to_array();
+        let runs = d.cmpne(DVec3::ZERO);
+        let mut at = cell.to_array();
+        // The index within the brick's block changes its upper bits where the line leaves it.
+        let home = at.map(|c| c >> BRICK_LOG2);
+        let exit = |axis: usize, c: i32| f64::from(c + ahead[axis]) - origin[axis];
+        let mut exits: [f64; 3] = std::array::from_fn(|axis| {
+            if runs.test(axis) {
+                exit(axis, at[axis]) * per_voxel[axis]
+            } else {
+                // Along a face the line never leaves through it.
+                f64::INFINITY
+            }
+        });
+        let mut now = *t;
+        loop {
+            let mut axis = usize::from(exits[1] < exits[0]);
+            if exits[2] < exits[axis] {
+                axis = 2;
+            }
+            let leaves = exits[axis];
+            let end = leaves.min(t1).max(now);
+            let here = IVec3::from_array(at);
+            visit(&Step {
+                t0: now,
+                t1: end,
+                run: self.run(brick.corners(here), here, (now, end)),
+                axis,
+            })?;
+            if leaves >= t1 {
+                return ControlFlow::Continue(false);
+            }
+            now = end;
+            at[axis] += step[axis];
+            if at[axis] >> BRICK_LOG2 != home[axis] {
+                (*cell, *t) = (IVec3::from_array(at), now);
+                return ControlFlow::Continue(true);
+            }
+            exits[axis] = exit(axis, at[axis]) * per_voxel[axis];
         }
     }
 }

@@ -10,13 +10,13 @@ fn place(name: &str) -> Option<std::ops::Range<usize>> {
 }
 
 /// Whether the file's name has a place for a number.
-pub(crate) fn has_place(path: &Path) -> bool {
+pub fn has_place(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default();
     place(&name.to_string_lossy()).is_some()
 }
 
 /// The name for frame `number`, with at least as many digits as there are `#`; the name itself where there are none.
-pub(crate) fn numbered(path: &Path, number: u32) -> PathBuf {
+pub fn numbered(path: &Path, number: u32) -> PathBuf {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
         return path.to_owned();
     };
