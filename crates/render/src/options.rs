@@ -324,10 +324,15 @@ impl Phase {
     }
 }
 
-/// Hears how far a render is. Called from many threads, often: it must be quick.
+/// Hears how far a render is, and may end it. Called from many threads, often: it must be quick.
 pub trait Progress: Sync {
     /// The render is in `phase`, of which `fraction` (0 to 1) is done, and holds `records` cache records.
     fn update(&self, phase: Phase, fraction: f32, records: usize);
+
+    /// Whether the render is to end with what there is, as when its time is up. Once true, it stays so.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// Silence.

@@ -5,6 +5,7 @@ use crate::error::CliError;
 use crate::numbered::{has_place, numbered};
 use crate::output;
 use crate::progress::Bar;
+use crate::signals::Signals;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,7 +17,7 @@ use tyndall_render::{Outcome, Renderer};
 use tyndall_scene::camera::Camera;
 use tyndall_scene::{LoadOptions, Scene};
 
-pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
+pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> {
     let start = Instant::now();
     let options = render_options(args);
     options.check()?;
@@ -53,7 +54,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     }
     let load_s = start.elapsed().as_secs_f64();
 
-    let bar = Bar::new(args.quiet);
+    let bar = Bar::new(args.quiet, signals);
     let mut renderer = Renderer::new(&scene, &options, &bar)?;
     if let Some(path) = &args.cache_in {
         renderer.read_cache(path)?;
@@ -62,6 +63,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         .iter()
         .map(|job| camera(&scene, job))
         .collect::<Result<_, CliError>>()?;
+    signals.defer();
     if args.fill_only || args.frames.is_some() || args.cache_out.is_some() {
         renderer.fill(&cameras);
     }
@@ -73,6 +75,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
     }
     if args.fill_only {
         bar.finish();
+        if let Some(signal) = signals.last() {
+            output::say(&format!(
+                "interrupted by {}: the cache file holds the records so far; a render that starts from it goes on with them",
+                signal.name()
+            ));
+            return Err(CliError::Interrupted(signal));
+        }
         if renderer.is_cut_short() {
             output::warn([
                 "the time limit ended the filling of the cache; a render that starts from the file goes on with it",
@@ -87,6 +96,21 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         let mut outcome = outcome?;
         outcome.stats.load_s = if since == start { load_s } else { 0.0 };
         finish(args, &scene, job, &mut outcome, since)?;
+        if let Some(signal) = signals.last() {
+            let image = if outcome.cancelled {
+                format!(
+                    "the best so far, after {:.1} samples per pixel",
+                    outcome.stats.spp
+                )
+            } else {
+                "finished".to_owned()
+            };
+            output::say(&format!(
+                "interrupted by {}: the image is {image}",
+                signal.name()
+            ));
+            return Err(CliError::Interrupted(signal));
+        }
         since = Instant::now();
     }
     Ok(())
@@ -310,7 +334,7 @@ mod tests {
             "none.ron -o no-such-folder/x.exr",
             "none.ron -o x.exr --stats no-such-folder/s.json",
         ] {
-            let error = run(&args(line)).unwrap_err();
+            let error = run(&args(line), &Signals::listen().unwrap()).unwrap_err();
             assert!(matches!(error, CliError::Render(_)), "{line}: {error}");
             assert_eq!(error.status(), 2);
         }

@@ -67,6 +67,8 @@ impl Frame<'_> {
         stats.rays += tally.rays + estimate_tally.rays;
         stats.lookups = tally.lookups;
         stats.lookups_missed = tally.missed;
+        let cut_short = timed_out || prepared.is_cut_short();
+        let cancelled = cut_short && run.progress.is_cancelled();
         let mut image = film.image();
         let mut map = RecordMap::new(&run.scene.geometry, self.view, run.crop);
         prepared.show_records(&mut map);
@@ -76,7 +78,8 @@ impl Frame<'_> {
             summary: summary(run, prepared, &stats),
             image,
             stats,
-            timed_out: timed_out || prepared.is_cut_short(),
+            timed_out: cut_short && !cancelled,
+            cancelled,
         })
     }
 

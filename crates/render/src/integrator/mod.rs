@@ -52,6 +52,8 @@ pub struct Outcome {
     pub notes: Vec<String>,
     /// Whether the time limit ended the render before its error or samples were met.
     pub timed_out: bool,
+    /// As `timed_out`, where [`Progress::is_cancelled`] ended it.
+    pub cancelled: bool,
     /// What was switched on, in one line.
     pub summary: String,
 }
@@ -156,7 +158,7 @@ impl<'s> Renderer<'s> {
         self.fill_s += start.elapsed().as_secs_f64();
     }
 
-    /// Whether a time limit ended the filling; the next frame, or who reads the cache file, goes on with it.
+    /// Whether a time limit, or who cancelled it, ended the filling; the next frame, or who reads the cache file, goes on with it.
     pub fn is_cut_short(&self) -> bool {
         self.prepared.is_cut_short()
     }
@@ -228,8 +230,11 @@ impl<'s> Run<'s> {
         }
     }
 
-    /// When a share of the time limit is spent.
+    /// When a share of the time limit is spent; it is where the render is cancelled.
     fn deadline(&self, share: f64) -> Option<Instant> {
+        if self.progress.is_cancelled() {
+            return Some(self.start);
+        }
         let limit = self.options.time_limit?;
         self.start.checked_add(limit.mul_f64(share))
     }

@@ -12,6 +12,7 @@ use crate::noise::{MOST_SAMPLES, Region, Rule, pilot, whole_blocks, with_margin}
 use crate::options::{Crop, Integrator, Phase};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 use tyndall_math::{Key, Purpose, Sampler};
 use tyndall_transport::path::Reach;
 
@@ -19,6 +20,8 @@ use tyndall_transport::path::Reach;
 const FIRST_SAMPLES: u32 = 8;
 /// By how much the samples of a path-traced image may grow at once.
 const GROWTH: f64 = 4.0;
+/// How long the first samples of a cancelled render may take, so that there is an image at all.
+const GRACE: Duration = Duration::from_millis(500);
 /// Keeps the numbers of the pilot's places from those of its samples.
 const PLACES: u64 = 1 << 32;
 
@@ -182,6 +185,7 @@ impl Sampling<'_> {
             .sum();
         let is_first = films.iter().any(|film| film.has_gaps());
         let added = AtomicU64::new(0);
+        let begun = Instant::now();
         let top = films.iter().map(|film| film.crop().y).min().unwrap_or(0);
         let mut rows: Vec<(FilmRow<'_>, &[u32])> = Vec::new();
         for (film, goals) in films.iter_mut().zip(goals) {
@@ -194,8 +198,9 @@ impl Sampling<'_> {
             .par_iter_mut()
             .with_max_len(1)
             .map(|(row, goals)| {
+                let is_graced = self.run.progress.is_cancelled() && begun.elapsed() < GRACE;
                 let is_over = has_passed(self.run.deadline(RENDER_DEADLINE));
-                if is_over && (!is_first || row.y > top) {
+                if is_over && !(is_first && (is_graced || row.y == top)) {
                     return None;
                 }
                 let (pass, samples) = self.row(row, goals);
