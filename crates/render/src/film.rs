@@ -9,6 +9,7 @@ use crate::layers::{LAYERS, Layer, LayerSet, Source};
 use crate::options::Crop;
 use crate::relative::{mean, median_5x5, weighted, weights};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// What one camera sample sees, layer by layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,15 +37,59 @@ const EVEN: usize = 3;
 ///
 /// The sums are f64: a f32 sum of n equal values drifts by up to n · 6·10⁻⁸ of itself, which 10⁴ samples make visible beside the exact
 /// benchmarks; it also keeps one bright sample from swallowing the ones after it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(try_from = "Kept")]
 pub struct Film {
     frame: [u32; 2],
     crop: Crop,
     layers: LayerSet,
+    #[serde(skip_serializing)]
     stored: Vec<Stored>,
+    #[serde(skip_serializing)]
     stride: usize,
     sums: Vec<f64>,
     counts: Vec<[u32; 2]>,
+}
+
+/// A film as a file keeps it.
+#[derive(Deserialize)]
+struct Kept {
+    frame: [u32; 2],
+    crop: Crop,
+    layers: LayerSet,
+    sums: Vec<f64>,
+    counts: Vec<[u32; 2]>,
+}
+
+impl TryFrom<Kept> for Film {
+    type Error = RenderError;
+
+    /// A film that could have been filled sample by sample.
+    fn try_from(kept: Kept) -> Result<Self, RenderError> {
+        const MOST: u32 = u32::MAX / 4;
+        let crop = kept.crop.within(kept.frame)?;
+        let broken = || RenderError::Option {
+            option: "a film",
+            found: "broken".to_owned(),
+            allowed: "one that was written whole".to_owned(),
+        };
+        // Before memory is asked for.
+        if u64::from(crop.width) * u64::from(crop.height) != kept.counts.len() as u64 {
+            return Err(broken());
+        }
+        let film = Self::new(kept.frame, crop, kept.layers)?;
+        let is_whole = film.sums.len() == kept.sums.len()
+            && kept.sums.iter().all(|sum| sum.is_finite())
+            && kept.counts.iter().flatten().all(|&n| n <= MOST);
+        if !is_whole {
+            return Err(broken());
+        }
+        Ok(Self {
+            sums: kept.sums,
+            counts: kept.counts,
+            ..film
+        })
+    }
 }
 
 /// A layer that is summed, and where in a pixel's sums it stands.
@@ -104,6 +149,12 @@ impl Film {
     /// The part of the frame that is filmed.
     pub fn crop(&self) -> Crop {
         self.crop
+    }
+
+    /// Whether it is of this part of a frame, and can give these layers.
+    pub(crate) fn is_of(&self, frame: [u32; 2], crop: Crop, layers: &LayerSet) -> bool {
+        let names = |layers: &LayerSet| String::from(layers.clone());
+        self.frame == frame && self.crop == crop && names(&self.layers) == names(layers)
     }
 
     /// The rows from top to bottom, to be filled in parallel.

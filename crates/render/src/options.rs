@@ -111,7 +111,7 @@ impl FromStr for Depth {
 }
 
 /// A part of the frame, in pixels; row 0 is the top.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Crop {
     /// First column.
     pub x: u32,

@@ -5,7 +5,7 @@ use crate::error::CliError;
 use crate::numbered::{has_place, numbered};
 use crate::output;
 use crate::progress::Bar;
-use crate::signals::Signals;
+use crate::signals::{Signal, Signals};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -27,7 +27,8 @@ pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> 
         check_writable(path)?;
     }
     let numbers = jobs.iter().filter_map(|job| job.stats.as_ref());
-    for path in numbers.chain(&args.cache_out) {
+    let checkpoint = checkpoint(&outputs);
+    for path in numbers.chain(&args.cache_out).chain(&checkpoint) {
         check_place(path)?;
     }
     let scene = tyndall_scene::load(&args.scene, &load_options(args))?;
@@ -43,7 +44,7 @@ pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> 
         .flat_map(|job| job.outputs.iter().chain(&job.stats));
     apart(
         scene.files.iter().chain(&args.cache_in),
-        written.chain(kept),
+        written.chain(kept).chain(&checkpoint),
     )?;
     output::warn(&scene.warnings);
     let shows_colour_alone = |path: &PathBuf| matches!(ImageFormat::of(path), Ok(ImageFormat::Png));
@@ -56,13 +57,18 @@ pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> 
 
     let bar = Bar::new(args.quiet, signals);
     let mut renderer = Renderer::new(&scene, &options, &bar)?;
-    if let Some(path) = &args.cache_in {
-        renderer.read_cache(path)?;
-    }
     let cameras: Vec<Camera> = jobs
         .iter()
         .map(|job| camera(&scene, job))
         .collect::<Result<_, CliError>>()?;
+    let resumed = match &checkpoint {
+        Some(path) => resume(args, &mut renderer, path, &cameras)?,
+        None => None,
+    };
+    // A checkpoint holds all records that there were.
+    if let Some(path) = args.cache_in.as_ref().filter(|_| resumed.is_none()) {
+        renderer.read_cache(path)?;
+    }
     signals.defer();
     if args.fill_only || args.frames.is_some() || args.cache_out.is_some() {
         renderer.fill(&cameras);
@@ -90,30 +96,86 @@ pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> 
         return Ok(());
     }
     let mut since = start;
-    for (job, camera) in jobs.iter().zip(&cameras) {
-        let outcome = renderer.render(camera, job.number.unwrap_or(0));
+    let is_done = |job: &Job| resumed.is_some_and(|number| job.number() < number);
+    let mut left = jobs
+        .iter()
+        .zip(&cameras)
+        .skip_while(|(job, _)| is_done(job))
+        .peekable();
+    while let Some((job, camera)) = left.next() {
+        let outcome = renderer.render(camera, job.number());
         bar.finish();
         let mut outcome = outcome?;
         outcome.stats.load_s = if since == start { load_s } else { 0.0 };
         finish(args, &scene, job, &mut outcome, since)?;
         if let Some(signal) = signals.last() {
-            let image = if outcome.cancelled {
-                format!(
-                    "the best so far, after {:.1} samples per pixel",
-                    outcome.stats.spp
-                )
-            } else {
-                "finished".to_owned()
-            };
-            output::say(&format!(
-                "interrupted by {}: the image is {image}",
-                signal.name()
-            ));
+            if !outcome.cancelled {
+                match left.peek() {
+                    Some((next, _)) => renderer.keep_checkpoint_before(next.number()),
+                    None => renderer.remove_checkpoint()?,
+                }
+            }
+            output::say(&interrupted(signal, &outcome, renderer.has_checkpoint()));
             return Err(CliError::Interrupted(signal));
         }
         since = Instant::now();
     }
+    renderer.remove_checkpoint()?;
     Ok(())
+}
+
+/// Where what there is of the images is kept until they are finished.
+fn checkpoint(outputs: &[PathBuf]) -> Option<PathBuf> {
+    let mut name = outputs.first()?.as_os_str().to_owned();
+    name.push(".checkpoint");
+    Some(name.into())
+}
+
+/// Keeps checkpoints from now on, and goes on from the last one if that is asked for; tells the frame that was under way.
+fn resume(
+    args: &RenderArgs,
+    renderer: &mut Renderer<'_>,
+    path: &Path,
+    cameras: &[Camera],
+) -> Result<Option<u32>, CliError> {
+    renderer.keep_checkpoints(path, args.checkpoint_interval, cameras)?;
+    if !args.resume {
+        if path.exists() {
+            output::warn([format!(
+                "an earlier render left a checkpoint, which --resume goes on from and this render replaces: {}",
+                path.display()
+            )]);
+        }
+        return Ok(None);
+    }
+    let resumed = renderer.resume()?;
+    if !args.quiet {
+        let from = match resumed {
+            Some(_) => "going on from",
+            None => "starting from the beginning, for there is no",
+        };
+        output::say(&format!("{from} {}", path.display()));
+    }
+    Ok(resumed)
+}
+
+/// Says what a signal leaves.
+fn interrupted(signal: Signal, outcome: &Outcome, has_checkpoint: bool) -> String {
+    let image = if outcome.cancelled {
+        let spp = outcome.stats.spp;
+        format!("the best so far, after {spp:.1} samples per pixel")
+    } else {
+        "finished".to_owned()
+    };
+    let rest = if has_checkpoint {
+        "; --resume goes on from here"
+    } else {
+        ""
+    };
+    format!(
+        "interrupted by {}: the image is {image}{rest}",
+        signal.name()
+    )
 }
 
 /// One image, and where it goes.
@@ -122,6 +184,13 @@ struct Job {
     number: Option<u32>,
     outputs: Vec<PathBuf>,
     stats: Option<PathBuf>,
+}
+
+impl Job {
+    /// The number of its random numbers: that of the frame.
+    fn number(&self) -> u32 {
+        self.number.unwrap_or(0)
+    }
 }
 
 /// The images to make: one, or one a frame.
@@ -294,7 +363,7 @@ mod tests {
             .unwrap()
             .command
         {
-            Command::Render(args) => args,
+            Command::Render(args) => *args,
             other => panic!("{other:?}"),
         }
     }

@@ -14,16 +14,38 @@ pub fn replace_file(
     content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
 ) -> Result<(), RenderError> {
     let (target, beside) = places(path);
-    let written = write_whole(&beside, content)
-        .and_then(|()| std::fs::rename(&beside, &target).map_err(|e| e.to_string()));
-    written.map_err(|reason| {
-        // The write has failed already; a remainder that cannot be removed changes nothing about that.
-        let _ = std::fs::remove_file(&beside);
-        RenderError::Write {
-            path: path.to_owned(),
-            reason,
-        }
+    write_and_rename(&beside, &target, content).map_err(|reason| RenderError::Write {
+        path: path.to_owned(),
+        reason,
     })
+}
+
+/// As [`replace_file`], by way of a file of a given name, where what an earlier process left half written gives way.
+pub(crate) fn replace_file_through(
+    beside: &Path,
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
+) -> Result<(), RenderError> {
+    // Where it cannot be removed, it cannot be written anew either, and that is told.
+    let _ = std::fs::remove_file(beside);
+    write_and_rename(beside, path, content).map_err(|reason| RenderError::Write {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+fn write_and_rename(
+    beside: &Path,
+    target: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
+) -> Result<(), String> {
+    let written = write_whole(beside, content)
+        .and_then(|()| std::fs::rename(beside, target).map_err(|e| e.to_string()));
+    if written.is_err() {
+        // The write has failed already; a remainder that cannot be removed changes nothing about that.
+        let _ = std::fs::remove_file(beside);
+    }
+    written
 }
 
 /// Finds out whether a file could be written at `path`.

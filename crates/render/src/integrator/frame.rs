@@ -1,9 +1,11 @@
 //! One frame: its samples, what its error is believed to be, and what its user should know.
 
+use super::checkpoint::OfFrame;
 use super::estimate::Estimate;
 use super::prepare::Prepared;
 use super::record_map::RecordMap;
 use super::sampling::Sampling;
+use super::stages::State;
 use super::summary::{notes, summary};
 use super::view::View;
 use super::{Outcome, Run};
@@ -25,7 +27,12 @@ pub(super) struct Frame<'f> {
 }
 
 impl Frame<'_> {
-    pub(super) fn render(&self) -> Result<Outcome, RenderError> {
+    /// Renders the frame, from a state that an earlier process left where there is one.
+    pub(super) fn render(
+        &self,
+        known: Option<State>,
+        checkpoint: &mut OfFrame<'_>,
+    ) -> Result<Outcome, RenderError> {
         let Self { run, prepared, .. } = *self;
         let mut stats = Stats::default();
         prepared.count(&mut stats);
@@ -42,8 +49,10 @@ impl Frame<'_> {
             seed: self.seed,
             known: prepared.known(run.way),
             reach: run.reach(prepared.field.as_ref()),
+            layers: &layers,
+            target: self.noise_target(),
         };
-        let (mut film, tally, timed_out) = sampling.run(&layers, self.noise_target())?;
+        let (mut film, tally, timed_out) = sampling.run(known, checkpoint)?;
         stats.error_shares.extend(prepared.known_shares());
         if let Some(noise) = film.relative_error() {
             stats.error_shares.insert("noise", noise);

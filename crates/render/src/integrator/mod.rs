@@ -4,6 +4,7 @@
 
 mod cache_info;
 mod camera;
+mod checkpoint;
 mod counted;
 mod estimate;
 mod field;
@@ -16,6 +17,7 @@ mod pilot;
 mod prepare;
 mod record_map;
 mod sampling;
+mod stages;
 mod summary;
 mod view;
 
@@ -26,9 +28,11 @@ use crate::image::Image;
 use crate::options::{Crop, Depth, Integrator, Method, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
 use camera::least_multiple_depth;
+use checkpoint::{Keeper, OfFrame};
 use frame::Frame;
 use glam::Vec3;
 use prepare::Prepared;
+use stages::State;
 use std::path::Path;
 use std::time::Instant;
 use tyndall_scene::{Camera, FilmSize, Scene};
@@ -79,6 +83,9 @@ pub struct Renderer<'s> {
     fill_s: f64,
     /// Views that were filled, or begun, since the last image.
     begun: Vec<View>,
+    keeper: Option<Keeper>,
+    /// The frame that an earlier process left, and where its sampling stands.
+    resumed: Option<(u32, State)>,
 }
 
 impl<'s> Renderer<'s> {
@@ -117,6 +124,8 @@ impl<'s> Renderer<'s> {
             prepared: Prepared::default(),
             fill_s: 0.0,
             begun: Vec::new(),
+            keeper: None,
+            resumed: None,
         })
     }
 
@@ -177,7 +186,16 @@ impl<'s> Renderer<'s> {
             // The frame's own pixels, and no other frame's.
             seed: self.run.options.seed.wrapping_add(u64::from(number) << 32),
         };
-        let mut outcome = self.pool.install(|| frame.render())?;
+        let resumed = self.resumed.take().filter(|(of, _)| *of == number);
+        let mut checkpoint = OfFrame {
+            keeper: self.keeper.as_mut(),
+            prepared: &self.prepared,
+            number,
+        };
+        let outcome =
+            (self.pool).install(|| frame.render(resumed.map(|(_, state)| state), &mut checkpoint));
+        let mut outcome = outcome?;
+        outcome.notes.extend(self.checkpoint_fault());
         outcome.stats.fill_s = self.fill_s;
         outcome.stats.wall_s = self.run.start.elapsed().as_secs_f64();
         outcome.stats.threads = self.pool.current_num_threads();
