@@ -100,39 +100,51 @@ struct Stored {
     first: usize,
 }
 
+/// Which layers are summed, and how many numbers that takes a pixel.
+fn stored(layers: &LayerSet) -> (Vec<Stored>, usize) {
+    let mut stored = Vec::new();
+    let mut stride = 0;
+    for layer in LAYERS {
+        let value = match layer.source {
+            Source::PartOfBeauty(value) => value,
+            Source::Mean(value) if layers.contains(layer.name) => value,
+            _ => continue,
+        };
+        stored.push(Stored {
+            layer,
+            value,
+            first: stride,
+        });
+        stride += layer.channels.len();
+    }
+    (stored, stride + EVEN)
+}
+
+/// Empty rooms for the sums and counts of a film.
+fn reserve(crop: Crop, stride: usize) -> Result<(Vec<f64>, Vec<[u32; 2]>), RenderError> {
+    let n = crop.width as usize * crop.height as usize;
+    let (mut sums, mut counts) = (Vec::new(), Vec::new());
+    let reserved = sums
+        .try_reserve_exact(n * stride)
+        .and_then(|()| counts.try_reserve_exact(n));
+    if reserved.is_err() {
+        return Err(RenderError::Memory {
+            size: [crop.width, crop.height],
+            mib: (n * (stride * size_of::<f64>() + size_of::<[u32; 2]>())) >> 20,
+        });
+    }
+    Ok((sums, counts))
+}
+
 impl Film {
     /// An empty film for `crop`, a part of a frame of the given width and height, that can give the `layers`.
     ///
     /// # Errors
     /// Where the system refuses the memory.
     pub fn new(frame: [u32; 2], crop: Crop, layers: LayerSet) -> Result<Self, RenderError> {
-        let mut stored = Vec::new();
-        let mut stride = 0;
-        for layer in LAYERS {
-            let value = match layer.source {
-                Source::PartOfBeauty(value) => value,
-                Source::Mean(value) if layers.contains(layer.name) => value,
-                _ => continue,
-            };
-            stored.push(Stored {
-                layer,
-                value,
-                first: stride,
-            });
-            stride += layer.channels.len();
-        }
-        stride += EVEN;
+        let (stored, stride) = stored(&layers);
+        let (mut sums, mut counts) = reserve(crop, stride)?;
         let n = crop.width as usize * crop.height as usize;
-        let (mut sums, mut counts) = (Vec::new(), Vec::new());
-        let reserved = sums
-            .try_reserve_exact(n * stride)
-            .and_then(|()| counts.try_reserve_exact(n));
-        if reserved.is_err() {
-            return Err(RenderError::Memory {
-                size: [crop.width, crop.height],
-                mib: (n * (stride * size_of::<f64>() + size_of::<[u32; 2]>())) >> 20,
-            });
-        }
         sums.resize(n * stride, 0.0);
         counts.resize(n, [0; 2]);
         Ok(Self {
@@ -144,6 +156,14 @@ impl Film {
             sums,
             counts,
         })
+    }
+
+    /// Whether there is memory for a film, before anything is computed for one.
+    ///
+    /// # Errors
+    /// As [`Film::new`].
+    pub(crate) fn check_memory(crop: Crop, layers: &LayerSet) -> Result<(), RenderError> {
+        reserve(crop, stored(layers).1).map(drop)
     }
 
     /// The part of the frame that is filmed.

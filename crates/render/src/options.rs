@@ -7,6 +7,7 @@ use crate::layers::LayerSet;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::time::Duration;
+use tyndall_scene::Scene;
 
 /// How light is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -284,6 +285,12 @@ impl RenderOptions {
             }
         }
         Ok(())
+    }
+
+    /// The layers of the image, where nobody chooses those that show what there is in the scene.
+    pub(crate) fn layers_of(&self, scene: &Scene) -> LayerSet {
+        let usual = || LayerSet::usual(scene.media.emits());
+        self.layers.clone().unwrap_or_else(usual)
     }
 
     /// The size of the frame in pixels, where the scene itself asks for `scene`; one side given alone keeps the scene's proportions.

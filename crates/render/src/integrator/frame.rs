@@ -10,7 +10,6 @@ use super::summary::{notes, summary};
 use super::view::View;
 use super::{Outcome, Run};
 use crate::error::RenderError;
-use crate::layers::LayerSet;
 use crate::stats::Stats;
 use std::time::Instant;
 
@@ -36,11 +35,7 @@ impl Frame<'_> {
         let Self { run, prepared, .. } = *self;
         let mut stats = Stats::default();
         prepared.count(&mut stats);
-        let layers = run
-            .options
-            .layers
-            .clone()
-            .unwrap_or_else(|| LayerSet::usual(run.scene.media.emits()));
+        let layers = run.options.layers_of(run.scene);
 
         let rendering = Instant::now();
         let sampling = Sampling {

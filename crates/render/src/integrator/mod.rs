@@ -24,6 +24,7 @@ mod view;
 pub use cache_info::CacheInfo;
 
 use crate::error::RenderError;
+use crate::film::Film;
 use crate::image::Image;
 use crate::options::{Crop, Depth, Integrator, Method, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
@@ -92,7 +93,7 @@ impl<'s> Renderer<'s> {
     /// A renderer without records; see [`Renderer::read_cache`].
     ///
     /// # Errors
-    /// Options out of range, a crop outside the frame, or threads that cannot be started.
+    /// Options out of range, a crop outside the frame, too little memory for it, or threads that cannot be started.
     pub fn new(
         scene: &'s Scene,
         options: &'s RenderOptions,
@@ -110,6 +111,7 @@ impl<'s> Renderer<'s> {
             });
         }
         let crop = options.crop.unwrap_or(Crop::whole(frame)).within(frame)?;
+        Film::check_memory(crop, &options.layers_of(scene))?;
         let mut pool = rayon::ThreadPoolBuilder::new();
         if let Some(threads) = options.threads {
             pool = pool.num_threads(threads);
