@@ -5,6 +5,7 @@
 pub mod golden;
 pub mod image;
 pub mod program;
+pub mod readers;
 
 /// Compiles and runs the example of the workspace's README.
 #[cfg(doctest)]

@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::env;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 
 /// The workspace root.
@@ -79,11 +79,34 @@ pub fn succeed(folder: &Path, arguments: &str) -> String {
 
 /// Runs `tyndall` with these arguments in `folder`, without a terminal and without colours.
 pub fn run_tyndall<A: AsRef<OsStr>>(folder: &Path, arguments: &[A]) -> Output {
+    let output = command(folder, arguments).output();
+    output.expect("tyndall can be started")
+}
+
+/// Starts what [`run_line`] runs, and does not wait for its end.
+pub fn start_line(folder: &Path, arguments: &str) -> Child {
+    let mut command = command(folder, &arguments.split_whitespace().collect::<Vec<_>>());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().expect("tyndall can be started")
+}
+
+/// Sends a signal such as `INT` to a program.
+///
+/// # Panics
+/// If it has ended already and somebody has waited for it.
+pub fn signal(program: &Child, name: &str) {
+    let mut command = Command::new("kill");
+    command.args(["-s", name, &program.id().to_string()]);
+    let status = command.status().expect("kill can be started");
+    assert!(status.success(), "kill -s {name}: {status}");
+}
+
+fn command<A: AsRef<OsStr>>(folder: &Path, arguments: &[A]) -> Command {
     let mut command = Command::new(tyndall());
     command
         .args(arguments)
         .current_dir(folder)
         .stdin(Stdio::null())
         .env("NO_COLOR", "1");
-    command.output().expect("tyndall can be started")
+    command
 }

@@ -22,7 +22,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Make an image of a scene.
-    Render(RenderArgs),
+    Render(Box<RenderArgs>),
     /// Measure scattered light at one point of a scene.
     Probe(ProbeArgs),
     /// Tell how far an image is from a reference.
@@ -100,6 +100,13 @@ pub(crate) struct RenderArgs {
     /// Keep the records in this file.
     #[arg(long, value_name = "F")]
     pub(crate) cache_out: Option<PathBuf>,
+    /// Go on from the checkpoint that an interrupted render of the same image left beside it, if there is one: the pixels are those of a
+    /// render without a break.
+    #[arg(long, conflicts_with = "fill_only")]
+    pub(crate) resume: bool,
+    /// Seconds between checkpoints; they are kept as OUT.checkpoint until the images are finished.
+    #[arg(long, value_name = "S", default_value = "60", value_parser = value::seconds, allow_hyphen_values = true)]
+    pub(crate) checkpoint_interval: Duration,
     /// Compute and keep the records, and make no image.
     #[arg(long, requires = "cache_out", conflicts_with_all = ["output", "stats"])]
     pub(crate) fill_only: bool,
@@ -313,7 +320,7 @@ mod tests {
 
     fn render(options: &str) -> RenderArgs {
         match parse(&format!("tyndall render scene.ron {options}")).unwrap() {
-            Command::Render(args) => args,
+            Command::Render(args) => *args,
             other => panic!("{other:?}"),
         }
     }

@@ -1,5 +1,6 @@
 //! What ends the command, and with which exit status.
 
+use crate::signals::Signal;
 use tyndall_render::error::RenderError;
 use tyndall_render::probe::ProbeError;
 use tyndall_scene::volume_file::VolumeFileError;
@@ -51,7 +52,7 @@ pub(crate) enum CliError {
     },
     /// Records for frames whose densities differ.
     #[error(
-        "--cache-in and --cache-out keep the records of one density, and the volume files of this scene are a sequence with one for each \
+        "--cache-in, --cache-out and --resume keep the records of one density, and the volume files of this scene are a sequence with one for each \
          frame; leave them out, or ask for one frame, as in --frames 7..8"
     )]
     CacheOfSequence,
@@ -63,6 +64,9 @@ pub(crate) enum CliError {
         /// The file.
         path: String,
     },
+    /// A signal ended the command, which has said what it leaves.
+    #[error("interrupted by {}", .0.name())]
+    Interrupted(Signal),
     /// Standard output is closed or full.
     #[error("cannot write to standard output: {0}")]
     Output(std::io::Error),
@@ -83,6 +87,7 @@ impl CliError {
             | Self::CacheOfSequence
             | Self::UnknownKind { .. }
             | Self::Overwrites { .. } => 2,
+            Self::Interrupted(signal) => signal.status(),
             Self::Render(error) if error.is_input() => 2,
             Self::Render(_) | Self::Verify { .. } | Self::Output(_) | Self::Internal(_) => 1,
         }

@@ -8,6 +8,7 @@ mod error;
 mod failure;
 mod output;
 mod progress;
+mod signals;
 mod value;
 
 use clap::Parser;
@@ -20,8 +21,16 @@ fn main() -> ExitCode {
         // Prints help on standard output and ends with 0, or a usage error on standard error and ends with 2.
         Err(message) => message.exit(),
     };
-    match failure::catch(|| commands::run(&cli.command)) {
+    let signals = match signals::Signals::listen() {
+        Ok(signals) => signals,
+        Err(error) => {
+            output::say(&format!("error: cannot listen to signals: {error}"));
+            return ExitCode::FAILURE;
+        }
+    };
+    match failure::catch(|| commands::run(&cli.command, &signals)) {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error::CliError::Interrupted(signal)) => ExitCode::from(signal.status()),
         Err(error) => {
             output::say(&format!("error: {error}"));
             ExitCode::from(error.status())

@@ -1,5 +1,6 @@
 //! Progress on a terminal: phase, percent, time left, records so far.
 
+use crate::signals::Signals;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, PoisonError};
@@ -8,16 +9,17 @@ use tyndall_render::options::{Phase, Progress};
 /// Steps of a full bar.
 const STEPS: u64 = 1000;
 
-/// One line on standard error that is drawn anew, or nothing where that is no terminal.
+/// One line on standard error that is drawn anew, or nothing where that is no terminal. Signals end what it shows.
 pub(crate) struct Bar {
     bar: ProgressBar,
+    signals: Signals,
     /// The phase shown and the most records seen.
     shown: Mutex<(Option<Phase>, usize)>,
 }
 
 impl Bar {
     /// A bar that is hidden when `quiet` or when standard error is no terminal.
-    pub(crate) fn new(quiet: bool) -> Self {
+    pub(crate) fn new(quiet: bool, signals: &Signals) -> Self {
         let visible = !quiet && stderr().is_terminal();
         let target = if visible {
             ProgressDrawTarget::stderr_with_hz(5)
@@ -28,6 +30,7 @@ impl Bar {
         let bar = ProgressBar::with_draw_target(Some(STEPS), target);
         Self {
             bar: bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())),
+            signals: signals.clone(),
             shown: Mutex::default(),
         }
     }
@@ -57,5 +60,9 @@ impl Progress for Bar {
         self.bar.set_message(message);
         self.bar
             .set_position((fraction.clamp(0.0, 1.0) * STEPS as f32) as u64);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.signals.last().is_some()
     }
 }

@@ -3,6 +3,7 @@
 //! [`RenderError::is_input`] tells mistakes in the command or its files from failures of the machine, which is what exit statuses need.
 
 use crate::layers::known_layers;
+use crate::sealed::SealFault;
 use std::path::PathBuf;
 use tyndall_scene::{FilmSizeError, SceneError};
 
@@ -109,6 +110,14 @@ pub enum RenderError {
         /// What is wrong with it.
         fault: CacheFault,
     },
+    /// A checkpoint that a render cannot go on from.
+    #[error("{fault}: {}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: CheckpointFault,
+    },
     /// A file of the scene that could be read when the scene was loaded, and no longer can.
     #[error(transparent)]
     Scene {
@@ -205,6 +214,58 @@ pub enum CacheFault {
         found: &'static str,
         /// The render's.
         wanted: &'static str,
+    },
+}
+
+impl From<SealFault> for CacheFault {
+    fn from(fault: SealFault) -> Self {
+        match fault {
+            SealFault::Unreadable { reason } => Self::Unreadable { reason },
+            SealFault::Foreign => Self::NotACache,
+            SealFault::OtherVersion { found, known } => Self::OtherVersion { found, known },
+            SealFault::Truncated { found, wanted } => Self::Truncated { found, wanted },
+            SealFault::Damaged => Self::Damaged,
+            SealFault::Contents { reason } => Self::Contents { reason },
+        }
+    }
+}
+
+/// Why a render cannot go on from a checkpoint.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointFault {
+    /// Its contents cannot be had.
+    #[error(
+        "the checkpoint is of no use, {0}; without --resume the render starts from the beginning"
+    )]
+    File(#[from] SealFault),
+    /// Other options shape other pixels.
+    #[error(
+        "the checkpoint was made with {name} {found}, and {wanted} is asked for now; give the same, or start from the beginning without --resume"
+    )]
+    OtherOption {
+        /// As the command line spells it, where it is an option.
+        name: String,
+        /// The checkpoint's.
+        found: String,
+        /// The render's.
+        wanted: String,
+    },
+    /// Samples of another scene.
+    #[error(
+        "the checkpoint was made for another scene: geometry, materials, lights or media differ; without --resume the render starts from the beginning"
+    )]
+    OtherScene,
+    /// Samples of other views.
+    #[error(
+        "the checkpoint was made for other cameras or frames; without --resume the render starts from the beginning"
+    )]
+    OtherCameras,
+    /// The images are done, and it cannot be removed.
+    #[error("the checkpoint is no longer needed and cannot be removed ({reason})")]
+    Stays {
+        /// What the system said.
+        reason: String,
     },
 }
 

@@ -9,6 +9,7 @@ use crate::layers::{LAYERS, Layer, LayerSet, Source};
 use crate::options::Crop;
 use crate::relative::{mean, median_5x5, weighted, weights};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// What one camera sample sees, layer by layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,15 +37,59 @@ const EVEN: usize = 3;
 ///
 /// The sums are f64: a f32 sum of n equal values drifts by up to n · 6·10⁻⁸ of itself, which 10⁴ samples make visible beside the exact
 /// benchmarks; it also keeps one bright sample from swallowing the ones after it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(try_from = "Kept")]
 pub struct Film {
     frame: [u32; 2],
     crop: Crop,
     layers: LayerSet,
+    #[serde(skip_serializing)]
     stored: Vec<Stored>,
+    #[serde(skip_serializing)]
     stride: usize,
     sums: Vec<f64>,
     counts: Vec<[u32; 2]>,
+}
+
+/// A film as a file keeps it.
+#[derive(Deserialize)]
+struct Kept {
+    frame: [u32; 2],
+    crop: Crop,
+    layers: LayerSet,
+    sums: Vec<f64>,
+    counts: Vec<[u32; 2]>,
+}
+
+impl TryFrom<Kept> for Film {
+    type Error = RenderError;
+
+    /// A film that could have been filled sample by sample.
+    fn try_from(kept: Kept) -> Result<Self, RenderError> {
+        const MOST: u32 = u32::MAX / 4;
+        let crop = kept.crop.within(kept.frame)?;
+        let broken = || RenderError::Option {
+            option: "a film",
+            found: "broken".to_owned(),
+            allowed: "one that was written whole".to_owned(),
+        };
+        // Before memory is asked for.
+        if u64::from(crop.width) * u64::from(crop.height) != kept.counts.len() as u64 {
+            return Err(broken());
+        }
+        let film = Self::new(kept.frame, crop, kept.layers)?;
+        let is_whole = film.sums.len() == kept.sums.len()
+            && kept.sums.iter().all(|sum| sum.is_finite())
+            && kept.counts.iter().flatten().all(|&n| n <= MOST);
+        if !is_whole {
+            return Err(broken());
+        }
+        Ok(Self {
+            sums: kept.sums,
+            counts: kept.counts,
+            ..film
+        })
+    }
 }
 
 /// A layer that is summed, and where in a pixel's sums it stands.
@@ -55,39 +100,51 @@ struct Stored {
     first: usize,
 }
 
+/// Which layers are summed, and how many numbers that takes a pixel.
+fn stored(layers: &LayerSet) -> (Vec<Stored>, usize) {
+    let mut stored = Vec::new();
+    let mut stride = 0;
+    for layer in LAYERS {
+        let value = match layer.source {
+            Source::PartOfBeauty(value) => value,
+            Source::Mean(value) if layers.contains(layer.name) => value,
+            _ => continue,
+        };
+        stored.push(Stored {
+            layer,
+            value,
+            first: stride,
+        });
+        stride += layer.channels.len();
+    }
+    (stored, stride + EVEN)
+}
+
+/// Empty rooms for the sums and counts of a film.
+fn reserve(crop: Crop, stride: usize) -> Result<(Vec<f64>, Vec<[u32; 2]>), RenderError> {
+    let n = crop.width as usize * crop.height as usize;
+    let (mut sums, mut counts) = (Vec::new(), Vec::new());
+    let reserved = sums
+        .try_reserve_exact(n * stride)
+        .and_then(|()| counts.try_reserve_exact(n));
+    if reserved.is_err() {
+        return Err(RenderError::Memory {
+            size: [crop.width, crop.height],
+            mib: (n * (stride * size_of::<f64>() + size_of::<[u32; 2]>())) >> 20,
+        });
+    }
+    Ok((sums, counts))
+}
+
 impl Film {
     /// An empty film for `crop`, a part of a frame of the given width and height, that can give the `layers`.
     ///
     /// # Errors
     /// Where the system refuses the memory.
     pub fn new(frame: [u32; 2], crop: Crop, layers: LayerSet) -> Result<Self, RenderError> {
-        let mut stored = Vec::new();
-        let mut stride = 0;
-        for layer in LAYERS {
-            let value = match layer.source {
-                Source::PartOfBeauty(value) => value,
-                Source::Mean(value) if layers.contains(layer.name) => value,
-                _ => continue,
-            };
-            stored.push(Stored {
-                layer,
-                value,
-                first: stride,
-            });
-            stride += layer.channels.len();
-        }
-        stride += EVEN;
+        let (stored, stride) = stored(&layers);
+        let (mut sums, mut counts) = reserve(crop, stride)?;
         let n = crop.width as usize * crop.height as usize;
-        let (mut sums, mut counts) = (Vec::new(), Vec::new());
-        let reserved = sums
-            .try_reserve_exact(n * stride)
-            .and_then(|()| counts.try_reserve_exact(n));
-        if reserved.is_err() {
-            return Err(RenderError::Memory {
-                size: [crop.width, crop.height],
-                mib: (n * (stride * size_of::<f64>() + size_of::<[u32; 2]>())) >> 20,
-            });
-        }
         sums.resize(n * stride, 0.0);
         counts.resize(n, [0; 2]);
         Ok(Self {
@@ -101,9 +158,23 @@ impl Film {
         })
     }
 
+    /// Whether there is memory for a film, before anything is computed for one.
+    ///
+    /// # Errors
+    /// As [`Film::new`].
+    pub(crate) fn check_memory(crop: Crop, layers: &LayerSet) -> Result<(), RenderError> {
+        reserve(crop, stored(layers).1).map(drop)
+    }
+
     /// The part of the frame that is filmed.
     pub fn crop(&self) -> Crop {
         self.crop
+    }
+
+    /// Whether it is of this part of a frame, and can give these layers.
+    pub(crate) fn is_of(&self, frame: [u32; 2], crop: Crop, layers: &LayerSet) -> bool {
+        let names = |layers: &LayerSet| String::from(layers.clone());
+        self.frame == frame && self.crop == crop && names(&self.layers) == names(layers)
     }
 
     /// The rows from top to bottom, to be filled in parallel.

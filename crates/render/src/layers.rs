@@ -5,6 +5,7 @@
 use crate::error::RenderError;
 use crate::film::Pixel;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
 /// One image layer.
@@ -138,7 +139,8 @@ pub fn known_layers() -> String {
 }
 
 /// The layers of one image, in the order of [`LAYERS`] and each once.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct LayerSet(Vec<&'static Layer>);
 
 impl LayerSet {
@@ -163,6 +165,22 @@ impl LayerSet {
 
     fn select(wanted: impl Fn(&Layer) -> bool) -> Self {
         Self(LAYERS.iter().filter(|layer| wanted(layer)).collect())
+    }
+}
+
+impl From<LayerSet> for String {
+    /// The list that gives the set back.
+    fn from(set: LayerSet) -> Self {
+        let names: Vec<&str> = set.iter().map(|layer| layer.name).collect();
+        names.join(",")
+    }
+}
+
+impl TryFrom<String> for LayerSet {
+    type Error = RenderError;
+
+    fn try_from(list: String) -> Result<Self, RenderError> {
+        list.parse()
     }
 }
 

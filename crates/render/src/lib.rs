@@ -64,7 +64,10 @@ mod noise;
 pub mod options;
 pub mod probe;
 pub mod relative;
+mod sealed;
 pub mod stats;
 pub mod verify;
+
+pub use sealed::SealFault;
 
 pub use integrator::{CacheInfo, Outcome, Renderer, render};

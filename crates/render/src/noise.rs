@@ -8,6 +8,7 @@ use crate::film::Film;
 use crate::layers::LayerSet;
 use crate::options::Crop;
 use crate::relative::{floor, median_5x5, weight, weighted};
+use serde::{Deserialize, Serialize};
 use tyndall_math::{Key, Sampler};
 
 /// Blocks are this many pixels wide and high, counted from the frame's corner; those at its far borders may be smaller.
@@ -23,12 +24,42 @@ const GROWTH: u32 = 4;
 pub(crate) const MOST_SAMPLES: u32 = 1 << 20;
 
 /// A part of the frame, made of whole blocks, that gets as many samples as its blocks need.
+#[derive(Deserialize, Serialize)]
+#[serde(try_from = "Kept")]
 pub(crate) struct Region {
     pub(crate) film: Film,
     /// The 5 × 5 median of the first samples, per channel and pixel.
     smooth: [Vec<f32>; 3],
     /// The sum of the first samples' means over pixels and channels: lone lit pixels leave no trace in medians.
     light: f64,
+}
+
+/// A region as a file keeps it.
+#[derive(Deserialize)]
+struct Kept {
+    film: Film,
+    smooth: [Vec<f32>; 3],
+    light: f64,
+}
+
+impl TryFrom<Kept> for Region {
+    type Error = &'static str;
+
+    fn try_from(kept: Kept) -> Result<Self, &'static str> {
+        let Kept {
+            film,
+            smooth,
+            light,
+        } = kept;
+        if smooth.iter().any(|channel| channel.len() != film.len()) {
+            return Err("a region has not as many medians as pixels");
+        }
+        Ok(Self {
+            film,
+            smooth,
+            light,
+        })
+    }
 }
 
 impl Region {
@@ -103,7 +134,7 @@ impl Region {
 }
 
 /// What decides how many samples a block needs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(crate) struct Rule {
     /// Samples over the root of what one sample's variance adds to the squared error.
     scale: f64,

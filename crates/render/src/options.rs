@@ -7,6 +7,7 @@ use crate::layers::LayerSet;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::time::Duration;
+use tyndall_scene::Scene;
 
 /// How light is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,7 +112,7 @@ impl FromStr for Depth {
 }
 
 /// A part of the frame, in pixels; row 0 is the top.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Crop {
     /// First column.
     pub x: u32,
@@ -286,6 +287,12 @@ impl RenderOptions {
         Ok(())
     }
 
+    /// The layers of the image, where nobody chooses those that show what there is in the scene.
+    pub(crate) fn layers_of(&self, scene: &Scene) -> LayerSet {
+        let usual = || LayerSet::usual(scene.media.emits());
+        self.layers.clone().unwrap_or_else(usual)
+    }
+
     /// The size of the frame in pixels, where the scene itself asks for `scene`; one side given alone keeps the scene's proportions.
     pub fn frame(&self, scene: [u32; 2]) -> [u32; 2] {
         let scaled = |n: u32, from: u32, to: u32| {
@@ -324,10 +331,15 @@ impl Phase {
     }
 }
 
-/// Hears how far a render is. Called from many threads, often: it must be quick.
+/// Hears how far a render is, and may end it. Called from many threads, often: it must be quick.
 pub trait Progress: Sync {
     /// The render is in `phase`, of which `fraction` (0 to 1) is done, and holds `records` cache records.
     fn update(&self, phase: Phase, fraction: f32, records: usize);
+
+    /// Whether the render is to end with what there is, as when its time is up. Once true, it stays so.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// Silence.

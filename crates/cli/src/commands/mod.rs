@@ -8,12 +8,13 @@ mod verify;
 
 use crate::args::{Command, SourceArgs};
 use crate::error::CliError;
+use crate::signals::Signals;
 use tyndall_scene::LoadOptions;
 
 /// Does what the command line asks for.
-pub(crate) fn run(command: &Command) -> Result<(), CliError> {
+pub(crate) fn run(command: &Command, signals: &Signals) -> Result<(), CliError> {
     match command {
-        Command::Render(args) => render::run(args),
+        Command::Render(args) => render::run(args, signals),
         Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),
         Command::Probe(args) => probe::run(args),

@@ -4,6 +4,7 @@ use crate::args::RenderArgs;
 use crate::error::CliError;
 use crate::output;
 use crate::progress::Bar;
+use crate::signals::{Signal, Signals};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,7 +17,7 @@ use tyndall_scene::camera::Camera;
 use tyndall_scene::numbered::{has_place, numbered};
 use tyndall_scene::{LoadOptions, Scene};
 
-pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
+pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> {
     let start = Instant::now();
     let options = render_options(args);
     options.check()?;
@@ -26,7 +27,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         check_writable(path)?;
     }
     let numbers = jobs.iter().filter_map(|job| job.stats.as_ref());
-    for path in numbers.chain(&args.cache_out) {
+    let checkpoint = checkpoint(&outputs);
+    for path in numbers.chain(&args.cache_out).chain(&checkpoint) {
         check_place(path)?;
     }
     let load = |job: &Job| {
@@ -52,7 +54,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         .flat_map(|job| job.outputs.iter().chain(&job.stats));
     apart(
         scene.files.iter().chain(&args.cache_in),
-        written.chain(kept),
+        written.chain(kept).chain(&checkpoint),
     )?;
     output::warn(&scene.warnings);
     let shows_colour_alone = |path: &PathBuf| matches!(ImageFormat::of(path), Ok(ImageFormat::Png));
@@ -62,17 +64,20 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), CliError> {
         ]);
     }
     if !scene.is_sequence || others.is_empty() {
-        return render_jobs(args, &options, &scene, &jobs, start);
+        let images = (&jobs[..], checkpoint.as_deref());
+        return render_jobs(args, &options, &scene, images, (start, signals));
     }
-    if args.cache_in.is_some() || args.cache_out.is_some() {
+    if args.cache_in.is_some() || args.cache_out.is_some() || args.resume {
         return Err(CliError::CacheOfSequence);
     }
-    render_jobs(args, &options, &scene, std::slice::from_ref(first), start)?;
+    let images = (std::slice::from_ref(first), None);
+    render_jobs(args, &options, &scene, images, (start, signals))?;
     drop(scene);
     for job in others {
         let start = Instant::now();
         let scene = load(job)?;
-        render_jobs(args, &options, &scene, std::slice::from_ref(job), start)?;
+        let images = (std::slice::from_ref(job), None);
+        render_jobs(args, &options, &scene, images, (start, signals))?;
     }
     Ok(())
 }
@@ -82,19 +87,25 @@ fn render_jobs(
     args: &RenderArgs,
     options: &RenderOptions,
     scene: &Scene,
-    jobs: &[Job],
-    start: Instant,
+    (jobs, checkpoint): (&[Job], Option<&Path>),
+    (start, signals): (Instant, &Signals),
 ) -> Result<(), CliError> {
     let load_s = start.elapsed().as_secs_f64();
-    let bar = Bar::new(args.quiet);
+    let bar = Bar::new(args.quiet, signals);
     let mut renderer = Renderer::new(scene, options, &bar)?;
-    if let Some(path) = &args.cache_in {
-        renderer.read_cache(path)?;
-    }
     let cameras: Vec<Camera> = jobs
         .iter()
         .map(|job| camera(scene, job))
         .collect::<Result<_, CliError>>()?;
+    let resumed = match checkpoint {
+        Some(path) => resume(args, &mut renderer, path, &cameras)?,
+        None => None,
+    };
+    // A checkpoint holds all records that there were.
+    if let Some(path) = args.cache_in.as_ref().filter(|_| resumed.is_none()) {
+        renderer.read_cache(path)?;
+    }
+    signals.defer();
     if args.fill_only || args.frames.is_some() || args.cache_out.is_some() {
         renderer.fill(&cameras);
     }
@@ -106,6 +117,13 @@ fn render_jobs(
     }
     if args.fill_only {
         bar.finish();
+        if let Some(signal) = signals.last() {
+            output::say(&format!(
+                "interrupted by {}: the cache file holds the records so far; a render that starts from it goes on with them",
+                signal.name()
+            ));
+            return Err(CliError::Interrupted(signal));
+        }
         if renderer.is_cut_short() {
             output::warn([
                 "the time limit ended the filling of the cache; a render that starts from the file goes on with it",
@@ -114,17 +132,91 @@ fn render_jobs(
         return Ok(());
     }
     let mut since = start;
-    for (job, camera) in jobs.iter().zip(&cameras) {
-        // What stands still in a sequence of densities shall look still: its noise, too.
+    // What stands still in a sequence of densities shall look still: its noise, too.
+    let number_of = |job: &Job| {
         let number = job.number.filter(|_| !scene.is_sequence);
-        let outcome = renderer.render(camera, number.unwrap_or(0));
+        number.unwrap_or(0)
+    };
+    let is_done = |job: &Job| resumed.is_some_and(|number| number_of(job) < number);
+    let mut left = jobs
+        .iter()
+        .zip(&cameras)
+        .skip_while(|(job, _)| is_done(job))
+        .peekable();
+    while let Some((job, camera)) = left.next() {
+        let outcome = renderer.render(camera, number_of(job));
         bar.finish();
         let mut outcome = outcome?;
         outcome.stats.load_s = if since == start { load_s } else { 0.0 };
         finish(args, scene, job, &mut outcome, since)?;
+        if let Some(signal) = signals.last() {
+            if !outcome.cancelled {
+                match left.peek() {
+                    Some((next, _)) => renderer.keep_checkpoint_before(number_of(next)),
+                    None => renderer.remove_checkpoint()?,
+                }
+            }
+            output::say(&interrupted(signal, &outcome, renderer.has_checkpoint()));
+            return Err(CliError::Interrupted(signal));
+        }
         since = Instant::now();
     }
+    renderer.remove_checkpoint()?;
     Ok(())
+}
+
+/// Where what there is of the images is kept until they are finished.
+fn checkpoint(outputs: &[PathBuf]) -> Option<PathBuf> {
+    let mut name = outputs.first()?.as_os_str().to_owned();
+    name.push(".checkpoint");
+    Some(name.into())
+}
+
+/// Keeps checkpoints from now on, and goes on from the last one if that is asked for; tells the frame that was under way.
+fn resume(
+    args: &RenderArgs,
+    renderer: &mut Renderer<'_>,
+    path: &Path,
+    cameras: &[Camera],
+) -> Result<Option<u32>, CliError> {
+    renderer.keep_checkpoints(path, args.checkpoint_interval, cameras)?;
+    if !args.resume {
+        if path.exists() {
+            output::warn([format!(
+                "an earlier render left a checkpoint, which --resume goes on from and this render replaces: {}",
+                path.display()
+            )]);
+        }
+        return Ok(None);
+    }
+    let resumed = renderer.resume()?;
+    if !args.quiet {
+        let from = match resumed {
+            Some(_) => "going on from",
+            None => "starting from the beginning, for there is no",
+        };
+        output::say(&format!("{from} {}", path.display()));
+    }
+    Ok(resumed)
+}
+
+/// Says what a signal leaves.
+fn interrupted(signal: Signal, outcome: &Outcome, has_checkpoint: bool) -> String {
+    let image = if outcome.cancelled {
+        let spp = outcome.stats.spp;
+        format!("the best so far, after {spp:.1} samples per pixel")
+    } else {
+        "finished".to_owned()
+    };
+    let rest = if has_checkpoint {
+        "; --resume goes on from here"
+    } else {
+        ""
+    };
+    format!(
+        "interrupted by {}: the image is {image}{rest}",
+        signal.name()
+    )
 }
 
 /// One image, and where it goes.
@@ -305,7 +397,7 @@ mod tests {
             .unwrap()
             .command
         {
-            Command::Render(args) => args,
+            Command::Render(args) => *args,
             other => panic!("{other:?}"),
         }
     }
@@ -345,7 +437,7 @@ mod tests {
             "none.ron -o no-such-folder/x.exr",
             "none.ron -o x.exr --stats no-such-folder/s.json",
         ] {
-            let error = run(&args(line)).unwrap_err();
+            let error = run(&args(line), &Signals::listen().unwrap()).unwrap_err();
             assert!(matches!(error, CliError::Render(_)), "{line}: {error}");
             assert_eq!(error.status(), 2);
         }

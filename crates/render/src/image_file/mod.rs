@@ -6,6 +6,7 @@ mod exr_file;
 mod png_file;
 mod replace;
 
+pub(crate) use replace::replace_file_through;
 pub use replace::{check_place, replace_file};
 
 use crate::error::RenderError;

@@ -4,7 +4,7 @@
 
 use crate::error::RenderError;
 use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Write};
+use std::io::{BufWriter, Error, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,34 +13,48 @@ pub fn replace_file(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
 ) -> Result<(), RenderError> {
-    let (target, beside) = places(path);
-    let written = write_whole(&beside, content)
-        .and_then(|()| std::fs::rename(&beside, &target).map_err(|e| e.to_string()));
-    written.map_err(|reason| {
-        // The write has failed already; a remainder that cannot be removed changes nothing about that.
-        let _ = std::fs::remove_file(&beside);
-        RenderError::Write {
-            path: path.to_owned(),
-            reason,
-        }
+    let target = resolved(path);
+    let written = create_beside(&target)
+        .map_err(|error| error.to_string())
+        .and_then(|(beside, file)| write_and_rename(file, &beside, &target, content));
+    written.map_err(|reason| RenderError::Write {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+/// As [`replace_file`], by way of a file of a given name, where what an earlier process left half written gives way.
+pub(crate) fn replace_file_through(
+    beside: &Path,
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
+) -> Result<(), RenderError> {
+    // Where it cannot be removed, it cannot be written anew either, and that is told.
+    let _ = std::fs::remove_file(beside);
+    let written = File::create_new(beside)
+        .map_err(|error| error.to_string())
+        .and_then(|file| write_and_rename(file, beside, path, content));
+    written.map_err(|reason| RenderError::Write {
+        path: path.to_owned(),
+        reason,
     })
 }
 
 /// Finds out whether a file could be written at `path`.
 pub fn check_place(path: &Path) -> Result<(), RenderError> {
-    let (target, beside) = places(path);
+    let target = resolved(path);
     let probe = if target.is_dir() {
-        Err(std::io::Error::new(
+        Err(Error::new(
             ErrorKind::IsADirectory,
             "a folder of that name stands there",
         ))
     } else if target.exists() && !target.is_file() {
-        Err(std::io::Error::new(
+        Err(Error::new(
             ErrorKind::InvalidInput,
             "a device, pipe or socket stands there, which a finished file would replace",
         ))
     } else {
-        File::create_new(&beside).and_then(|_| std::fs::remove_file(&beside))
+        create_beside(&target).and_then(|(beside, _)| std::fs::remove_file(beside))
     };
     probe.map_err(|source| RenderError::OutputPlace {
         path: path.to_owned(),
@@ -48,21 +62,46 @@ pub fn check_place(path: &Path) -> Result<(), RenderError> {
     })
 }
 
-/// Where the file will stand (links resolved) and where it is written first.
-fn places(path: &Path) -> (PathBuf, PathBuf) {
+/// Where a file will stand, links resolved.
+fn resolved(path: &Path) -> PathBuf {
+    std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// A new file beside `target`, in which it is written first.
+fn create_beside(target: &Path) -> Result<(PathBuf, File), Error> {
     // Two writes of one process at one time must not meet; a counter does it without randomness.
     static NEXT: AtomicU64 = AtomicU64::new(0);
-    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let id = (std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
-    let beside = target.with_file_name(format!(".tyndall-{}-{}.part", id.0, id.1));
-    (target, beside)
+    loop {
+        let id = (std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
+        let beside = target.with_file_name(format!(".tyndall-{}-{}.part", id.0, id.1));
+        match File::create_new(&beside) {
+            // A process of the same number was killed here: in containers the first processes always have the same.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            created => return created.map(|file| (beside, file)),
+        }
+    }
+}
+
+fn write_and_rename(
+    file: File,
+    beside: &Path,
+    target: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
+) -> Result<(), String> {
+    let written = write_whole(file, content)
+        .and_then(|()| std::fs::rename(beside, target).map_err(|e| e.to_string()));
+    if written.is_err() {
+        // The write has failed already; a remainder that cannot be removed changes nothing about that.
+        let _ = std::fs::remove_file(beside);
+    }
+    written
 }
 
 fn write_whole(
-    path: &Path,
+    file: File,
     content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
 ) -> Result<(), String> {
-    let mut file = BufWriter::new(File::create_new(path).map_err(|e| e.to_string())?);
+    let mut file = BufWriter::new(file);
     content(&mut file)?;
     file.flush().map_err(|e| e.to_string())?;
     // Without this a power cut after the rename can leave an empty file.
@@ -86,5 +125,21 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("the disk is full"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+    #[test]
+    fn what_killed_processes_left_is_not_in_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stats.json");
+        let left = |n| format!(".tyndall-{}-{n}.part", std::process::id());
+        for n in 0..100 {
+            std::fs::write(folder.path().join(left(n)), "half").unwrap();
+        }
+        check_place(&path).unwrap();
+        replace_file(&path, |file| {
+            file.write_all(b"whole").map_err(|e| e.to_string())
+        })
+        .unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "whole");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 101);
     }
 }

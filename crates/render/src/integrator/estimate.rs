@@ -67,7 +67,7 @@ impl Estimate<'_> {
         let terms: Vec<Option<Term>> = (0..pixels)
             .into_par_iter()
             .map(|i| {
-                if has_passed(self.deadline) {
+                if has_passed(self.deadline) || progress.is_cancelled() {
                     return None;
                 }
                 let pixel = self.pixel(i, pixels, width * height);

@@ -129,7 +129,7 @@ pub(super) fn fill(
         }
         first = last;
         held += found.len() as u64;
-        cut_short = has_passed(deadline);
+        cut_short = has_passed(deadline) || progress.is_cancelled();
         progress.update(Phase::Fill, (0.2 * held as f32 / wanted as f32).min(0.2), 0);
     }
     let mut field = filling.end(&counted);

@@ -1,14 +1,15 @@
 //! One frame: its samples, what its error is believed to be, and what its user should know.
 
+use super::checkpoint::OfFrame;
 use super::estimate::Estimate;
 use super::prepare::Prepared;
 use super::record_map::RecordMap;
 use super::sampling::Sampling;
+use super::stages::State;
 use super::summary::{notes, summary};
 use super::view::View;
 use super::{Outcome, Run};
 use crate::error::RenderError;
-use crate::layers::LayerSet;
 use crate::stats::Stats;
 use std::time::Instant;
 
@@ -25,15 +26,16 @@ pub(super) struct Frame<'f> {
 }
 
 impl Frame<'_> {
-    pub(super) fn render(&self) -> Result<Outcome, RenderError> {
+    /// Renders the frame, from a state that an earlier process left where there is one.
+    pub(super) fn render(
+        &self,
+        known: Option<State>,
+        checkpoint: &mut OfFrame<'_>,
+    ) -> Result<Outcome, RenderError> {
         let Self { run, prepared, .. } = *self;
         let mut stats = Stats::default();
         prepared.count(&mut stats);
-        let layers = run
-            .options
-            .layers
-            .clone()
-            .unwrap_or_else(|| LayerSet::usual(run.scene.media.emits()));
+        let layers = run.options.layers_of(run.scene);
 
         let rendering = Instant::now();
         let sampling = Sampling {
@@ -42,8 +44,10 @@ impl Frame<'_> {
             seed: self.seed,
             known: prepared.known(),
             reach: run.reach(prepared.field.as_ref()),
+            layers: &layers,
+            target: self.noise_target(),
         };
-        let (mut film, tally, timed_out) = sampling.run(&layers, self.noise_target())?;
+        let (mut film, tally, timed_out) = sampling.run(known, checkpoint)?;
         stats.error_shares.extend(prepared.known_shares());
         if let Some(noise) = film.relative_error() {
             stats.error_shares.insert("noise", noise);
@@ -67,6 +71,8 @@ impl Frame<'_> {
         stats.rays += tally.rays + estimate_tally.rays;
         stats.lookups = tally.lookups;
         stats.lookups_missed = tally.missed;
+        let cut_short = timed_out || prepared.is_cut_short();
+        let cancelled = cut_short && run.progress.is_cancelled();
         let mut image = film.image();
         let mut map = RecordMap::new(&run.scene.geometry, self.view, run.crop);
         prepared.show_records(&mut map);
@@ -76,7 +82,8 @@ impl Frame<'_> {
             summary: summary(run, prepared, &stats),
             image,
             stats,
-            timed_out: timed_out || prepared.is_cut_short(),
+            timed_out: cut_short && !cancelled,
+            cancelled,
         })
     }
 

@@ -4,6 +4,7 @@
 
 mod cache_info;
 mod camera;
+mod checkpoint;
 mod counted;
 mod estimate;
 mod field;
@@ -16,19 +17,23 @@ mod pilot;
 mod prepare;
 mod record_map;
 mod sampling;
+mod stages;
 mod summary;
 mod view;
 
 pub use cache_info::CacheInfo;
 
 use crate::error::RenderError;
+use crate::film::Film;
 use crate::image::Image;
 use crate::options::{Crop, Depth, Integrator, Method, Progress, RenderOptions};
 use crate::stats::{Stats, peak_rss_mib};
 use camera::least_multiple_depth;
+use checkpoint::{Keeper, OfFrame};
 use frame::Frame;
 use glam::Vec3;
 use prepare::Prepared;
+use stages::State;
 use std::path::Path;
 use std::time::Instant;
 use tyndall_scene::{Camera, FilmSize, Scene};
@@ -52,6 +57,8 @@ pub struct Outcome {
     pub notes: Vec<String>,
     /// Whether the time limit ended the render before its error or samples were met.
     pub timed_out: bool,
+    /// As `timed_out`, where [`Progress::is_cancelled`] ended it.
+    pub cancelled: bool,
     /// What was switched on, in one line.
     pub summary: String,
 }
@@ -77,13 +84,16 @@ pub struct Renderer<'s> {
     fill_s: f64,
     /// Views that were filled, or begun, since the last image.
     begun: Vec<View>,
+    keeper: Option<Keeper>,
+    /// The frame that an earlier process left, and where its sampling stands.
+    resumed: Option<(u32, State)>,
 }
 
 impl<'s> Renderer<'s> {
     /// A renderer without records; see [`Renderer::read_cache`].
     ///
     /// # Errors
-    /// Options out of range, a crop outside the frame, or threads that cannot be started.
+    /// Options out of range, a crop outside the frame, too little memory for it, or threads that cannot be started.
     pub fn new(
         scene: &'s Scene,
         options: &'s RenderOptions,
@@ -101,6 +111,7 @@ impl<'s> Renderer<'s> {
             });
         }
         let crop = options.crop.unwrap_or(Crop::whole(frame)).within(frame)?;
+        Film::check_memory(crop, &options.layers_of(scene))?;
         let mut pool = rayon::ThreadPoolBuilder::new();
         if let Some(threads) = options.threads {
             pool = pool.num_threads(threads);
@@ -115,6 +126,8 @@ impl<'s> Renderer<'s> {
             prepared: Prepared::default(),
             fill_s: 0.0,
             begun: Vec::new(),
+            keeper: None,
+            resumed: None,
         })
     }
 
@@ -157,7 +170,7 @@ impl<'s> Renderer<'s> {
         self.fill_s += start.elapsed().as_secs_f64();
     }
 
-    /// Whether a time limit ended the filling; the next frame, or who reads the cache file, goes on with it.
+    /// Whether a time limit, or who cancelled it, ended the filling; the next frame, or who reads the cache file, goes on with it.
     pub fn is_cut_short(&self) -> bool {
         self.prepared.is_cut_short()
     }
@@ -176,7 +189,16 @@ impl<'s> Renderer<'s> {
             // The frame's own pixels, and no other frame's.
             seed: self.run.options.seed.wrapping_add(u64::from(number) << 32),
         };
-        let mut outcome = self.pool.install(|| frame.render())?;
+        let resumed = self.resumed.take().filter(|(of, _)| *of == number);
+        let mut checkpoint = OfFrame {
+            keeper: self.keeper.as_mut(),
+            prepared: &self.prepared,
+            number,
+        };
+        let outcome =
+            (self.pool).install(|| frame.render(resumed.map(|(_, state)| state), &mut checkpoint));
+        let mut outcome = outcome?;
+        outcome.notes.extend(self.checkpoint_fault());
         outcome.stats.fill_s = self.fill_s;
         outcome.stats.wall_s = self.run.start.elapsed().as_secs_f64();
         outcome.stats.threads = self.pool.current_num_threads();
@@ -229,8 +251,11 @@ impl<'s> Run<'s> {
         }
     }
 
-    /// When a share of the time limit is spent.
+    /// When a share of the time limit is spent; it is where the render is cancelled.
     fn deadline(&self, share: f64) -> Option<Instant> {
+        if self.progress.is_cancelled() {
+            return Some(self.start);
+        }
         let limit = self.options.time_limit?;
         self.start.checked_add(limit.mul_f64(share))
     }

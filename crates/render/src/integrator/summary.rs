@@ -23,19 +23,21 @@ pub(super) fn notes(
             tally.dropped
         ));
     }
-    if prepared.is_cut_short() {
+    // Who cancels a render knows why it is short of what was asked.
+    let is_cancelled = run.progress.is_cancelled();
+    if prepared.is_cut_short() && !is_cancelled {
         notes.push(
             "the time limit ended the filling of the cache: where light is not known paths are traced, with more noise"
                 .to_owned(),
         );
     }
-    if stats.spp < 1.0 {
+    if stats.spp < 1.0 && !is_cancelled {
         notes.push(
             "the time limit left rows of the image without samples: they repeat their neighbours"
                 .to_owned(),
         );
     }
-    if timed_out {
+    if timed_out && !is_cancelled {
         notes.push(format!(
             "the time limit ended the render after {:.1} samples per pixel; the image is the best so far",
             stats.spp

@@ -176,7 +176,7 @@ pub(super) struct Filled<T> {
     pub(super) rays: u64,
     /// Points at which records were computed, kept or not: each has random numbers of its own.
     asked: usize,
-    /// Whether the deadline ended the fill.
+    /// Whether the deadline, or who cancelled the render, ended the fill.
     pub(super) cut_short: bool,
 }
 
@@ -257,7 +257,7 @@ impl<K: Kind> Fill<'_, K> {
         for round in 0..ROUNDS {
             progress.update(Phase::Fill, fraction, filled.cache.len());
             let (missing, share) = self.uncovered(&filled.cache, gaps);
-            if self.out_of_time() {
+            if self.is_over(progress) {
                 filled.cut_short = true;
                 return false;
             }
@@ -290,7 +290,7 @@ impl<K: Kind> Fill<'_, K> {
             .par_iter()
             .enumerate()
             .map(|(i, point)| {
-                if self.out_of_time() {
+                if self.is_over(progress) {
                     return (None, 0);
                 }
                 let geometry = Counted::new(self.scene);
@@ -313,8 +313,8 @@ impl<K: Kind> Fill<'_, K> {
         kept.is_ok()
     }
 
-    fn out_of_time(&self) -> bool {
-        has_passed(self.deadline)
+    fn is_over(&self, progress: &dyn Progress) -> bool {
+        has_passed(self.deadline) || progress.is_cancelled()
     }
 
     /// Points on the camera rays of one level in view `number` that no record covers, in a fixed order, and their share of all points.
