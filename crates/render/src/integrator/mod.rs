@@ -40,10 +40,11 @@ use tyndall_scene::{Camera, FilmSize, Scene};
 use tyndall_transport::world::Lights;
 use view::View;
 
-/// Shares of a time limit after which the filling of the field, that of the caches and the samples end; the rest goes to the estimate
+/// Shares of a time limit after which the filling of the field, that of the caches, the image's pilot and the samples end; the rest goes to the estimate
 /// of the error.
 const FIELD_DEADLINE: f64 = 0.2;
 const FILL_DEADLINE: f64 = 0.4;
+const PILOT_DEADLINE: f64 = 0.5;
 const RENDER_DEADLINE: f64 = 0.8;
 
 /// A finished render.

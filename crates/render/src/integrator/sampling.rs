@@ -6,7 +6,7 @@ use super::camera::{Camera, Known, Tally};
 use super::checkpoint::OfFrame;
 use super::stages::{Next, State};
 use super::view::View;
-use super::{RENDER_DEADLINE, Run, has_passed};
+use super::{Run, has_passed};
 use crate::error::RenderError;
 use crate::film::{Film, FilmRow, Pixel};
 use crate::layers::LayerSet;
@@ -53,8 +53,9 @@ impl Sampling<'_> {
                     checkpoint.keep(Some(&state), false);
                 }
                 // A pass ends within about a second on common scenes, so that a time limit is kept.
+                let share = state.deadline();
                 let (films, goals) = state.films();
-                let (pass, complete) = self.pass(films, goals);
+                let (pass, complete) = self.pass(films, goals, share);
                 state.tally.add(&pass.tally);
                 if !complete || !pass.short_of_goals {
                     break complete;
@@ -74,8 +75,14 @@ impl Sampling<'_> {
         }
     }
 
-    /// Takes some samples of every pixel that is short of its goal; false where time ran out before all rows were done.
-    fn pass(&self, films: Vec<&mut Film>, goals: &[Vec<u32>]) -> (Pass, bool) {
+    /// Takes some samples of every pixel that is short of its goal; false where that
+    /// share of a time limit was over before all rows were done.
+    fn pass(
+        &self,
+        films: Vec<&mut Film>,
+        goals: &[Vec<u32>],
+        share: f64,
+    ) -> (Pass, bool) {
         let wanted: u64 = goals.iter().flatten().map(|&goal| u64::from(goal)).sum();
         let had: f64 = (films.iter())
             .map(|film| film.mean_samples() * film.len() as f64)
@@ -96,7 +103,7 @@ impl Sampling<'_> {
             .with_max_len(1)
             .map(|(row, goals)| {
                 let is_graced = self.run.progress.is_cancelled() && begun.elapsed() < GRACE;
-                let is_over = has_passed(self.run.deadline(RENDER_DEADLINE));
+                let is_over = has_passed(self.run.deadline(share));
                 if is_over && !(is_first && (is_graced || row.y == top)) {
                     return None;
                 }

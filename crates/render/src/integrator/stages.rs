@@ -3,9 +3,9 @@
 //! Path-traced images, and those of a fixed number, get equally many samples everywhere. Else a pilot of a few tiles finds the rule by
 //! which blocks of pixels ask for samples; then the part of the frame that is asked for gets its first samples, and those of the rule.
 
-use super::Run;
 use super::camera::Tally;
 use super::sampling::Sampling;
+use super::{PILOT_DEADLINE, RENDER_DEADLINE, Run};
 use crate::error::RenderError;
 use crate::film::Film;
 use crate::noise::{MOST_SAMPLES, Region, Rule, pilot, whole_blocks, with_margin};
@@ -79,6 +79,14 @@ impl State {
     /// The films that get samples, and how many their pixels are to have.
     pub(super) fn films(&mut self) -> (Vec<&mut Film>, &[Vec<u32>]) {
         (self.stage.films(), &self.goals)
+    }
+
+    /// The share of a time limit that may be gone when the stage ends: a pilot leaves some for the image itself.
+    pub(super) fn deadline(&self) -> f64 {
+        match self.stage {
+            Stage::PilotBegins { .. } | Stage::Pilot { .. } => PILOT_DEADLINE,
+            _ => RENDER_DEADLINE,
+        }
     }
 
     /// A stage whose pixels are all to have as many samples.

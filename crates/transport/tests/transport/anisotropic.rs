@@ -15,7 +15,8 @@ const ROOM: Room = Room {
     reflectance: 0.5,
     emission: 0.0,
 };
-const EYE: Vec3 = Vec3::new(-0.5, 0.1, 0.6);
+/// Near enough that directions to it turn fast.
+const EYE: Vec3 = Vec3::new(0.0, -0.1, 0.45);
 const X: Vec3 = Vec3::new(0.3, -0.24, 0.32);
 
 fn lamp() -> Lamps {
@@ -36,13 +37,15 @@ fn key(index: u64) -> Key {
 }
 
 fn field(world: &World<'_, Room, Lamps>, seed: u64) -> Field {
+    /// Enough for cells around `X`.
+    const WALKS: u64 = 30_000;
     let key = Key {
         seed,
         purpose: Purpose::Field,
         index: 0,
     };
     let mut found = Vec::new();
-    for walk in 0..100_000 {
+    for walk in 0..WALKS {
         let mut sampler = Sampler::new(key, walk);
         let ray = Ray::new(X, warp::uniform_sphere(sampler.next_2d()));
         Filling::walk(world, ray, &mut sampler, &mut found);
@@ -63,8 +66,8 @@ fn gradients_towards_an_eye_are_the_slopes_of_values() {
         lights: &lamps,
         media: &media,
     };
-    let pattern = GatherPattern::new(4096);
-    let records = 160;
+    let pattern = GatherPattern::new(1024);
+    let records = 80;
     let field = field(&world, 1);
     // One field for all: it is part of what is differentiated.
     let reach = Reach {
@@ -76,7 +79,7 @@ fn gradients_towards_an_eye_are_the_slopes_of_values() {
         gather::towards(&world, x, Some(Towards::Eye(EYE)), what, &pattern, key(i))
     };
     for (axis, step) in Vec3::AXES.into_iter().enumerate() {
-        let h = 0.1;
+        let h = 0.08;
         let (mut told, mut found) = (Estimate::default(), Estimate::default());
         for i in 0..records {
             told.add(Vec3::from(value(X, i).gradient.map(|d| d[axis])));
@@ -98,14 +101,14 @@ fn gradients_towards_an_eye_are_the_slopes_of_values() {
 
 #[test]
 fn records_that_end_in_a_field_are_those_of_whole_paths() {
-    for g in [-0.4, 0.5, 0.7, 0.9] {
+    for g in [-0.4, 0.7] {
         let (lamps, media) = (lamp(), media(g));
         let world = World {
             geometry: &ROOM,
             lights: &lamps,
             media: &media,
         };
-        let pattern = GatherPattern::new(4096);
+        let pattern = GatherPattern::new(1024);
         let (mut ended, mut whole) = (Estimate::default(), Estimate::default());
         for i in 0..8 {
             let field = field(&world, i);
