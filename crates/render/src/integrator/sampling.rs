@@ -77,12 +77,7 @@ impl Sampling<'_> {
 
     /// Takes some samples of every pixel that is short of its goal; false where that
     /// share of a time limit was over before all rows were done.
-    fn pass(
-        &self,
-        films: Vec<&mut Film>,
-        goals: &[Vec<u32>],
-        share: f64,
-    ) -> (Pass, bool) {
+    fn pass(&self, films: Vec<&mut Film>, goals: &[Vec<u32>], share: f64) -> (Pass, bool) {
         let wanted: u64 = goals.iter().flatten().map(|&goal| u64::from(goal)).sum();
         let had: f64 = (films.iter())
             .map(|film| film.mean_samples() * film.len() as f64)

@@ -70,12 +70,34 @@ impl Known {
 
 /// For whom records are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "usize", into = "usize")]
 pub(in crate::integrator) enum For {
     /// The one eye of the views they are made for, or any where media scatter alike in all directions.
     #[default]
     Eye,
     /// All eyes, by directions of light up to this band.
     All(usize),
+}
+
+impl TryFrom<usize> for For {
+    type Error = &'static str;
+
+    fn try_from(order: usize) -> Result<Self, &'static str> {
+        match order {
+            0 => Ok(Self::Eye),
+            1..=MOST_ORDER => Ok(Self::All(order)),
+            _ => Err("directions of light have more bands than there may be"),
+        }
+    }
+}
+
+impl From<For> for usize {
+    fn from(for_whom: For) -> Self {
+        match for_whom {
+            For::Eye => 0,
+            For::All(order) => order,
+        }
+    }
 }
 
 impl For {
