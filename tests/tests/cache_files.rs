@@ -338,3 +338,43 @@ fn a_cache_file_tells_what_it_holds() {
         [0, 1, 2].map(|i| info["records"]["surface"]["radius_m"][i].as_f64().unwrap());
     assert!(0.0 < least && least <= median && median <= most);
 }
+
+#[test]
+fn each_frame_has_records_in_fog_that_scatters_forward() {
+    let folder = folder();
+    // The last two are seen from one place.
+    let keys = "camera: Path([
+        Key(frame: 0, eye: (0.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), vfov: 45.0),
+        Key(frame: 1, eye: (0.6, 1.2, 3.8), target: (0.0, 1.0, 0.0), vfov: 45.0),
+        Key(frame: 2, eye: (0.6, 1.2, 3.8), target: (-1.0, 1.0, 0.0), vfov: 45.0),
+    ]),";
+    let still = "camera: LookAt(eye: (0.0, 1.0, 4.0), target: (0.0, 1.0, 0.0), vfov: 45.0),";
+    for g in [0.3, 0.9] {
+        let albedo = "albedo: (0.9, 0.9, 0.9),";
+        let phase = format!("{albedo} phase: HenyeyGreenstein(g: {g}),");
+        let walk = ROOM.replace(still, keys).replace(albedo, &phase);
+        fs::write(folder.path().join("walk.ron"), walk).unwrap();
+        let options = "--quiet --spp 4 --width 11 --height 9";
+        let missed = |frame: u32, more: &str| {
+            succeed(
+                &folder,
+                &format!("render walk.ron {options} -o w.#.exr --stats w.#.json{more}"),
+            );
+            let stats = folder.path().join(format!("w.{frame}.json"));
+            let stats: serde_json::Value =
+                serde_json::from_str(&fs::read_to_string(stats).unwrap()).unwrap();
+            stats["lookups_missed"].as_f64().unwrap()
+        };
+        missed(0, " --frames 0..1 --cache-out one.cache");
+        for frame in 0..3 {
+            let alone = missed(frame, &format!(" --frames {frame}..={frame}"));
+            for more in [" --frames 0..3", " --frames 0..3 --cache-in one.cache"] {
+                let in_walk = missed(frame, more);
+                assert!(
+                    in_walk < 1.5 * alone + 20.0,
+                    "g {g}, frame {frame},{more}: {in_walk}, alone {alone}"
+                );
+            }
+        }
+    }
+}

@@ -76,6 +76,10 @@ pub(super) fn run(args: &RenderArgs, signals: &Signals) -> Result<(), CliError> 
     for job in others {
         let start = Instant::now();
         let scene = load(job)?;
+        if let Some(signal) = signals.last() {
+            output::say(&format!("interrupted by {} between frames", signal.name()));
+            return Err(CliError::Interrupted(signal));
+        }
         let images = (std::slice::from_ref(job), None);
         render_jobs(args, &options, &scene, images, (start, signals))?;
     }
@@ -106,7 +110,9 @@ fn render_jobs(
         renderer.read_cache(path)?;
     }
     signals.defer();
-    if args.fill_only || args.frames.is_some() || args.cache_out.is_some() {
+    // A render that goes on was filled before.
+    let is_filled_ahead = args.fill_only || args.frames.is_some() || args.cache_out.is_some();
+    if is_filled_ahead && resumed.is_none() {
         renderer.fill(&cameras);
     }
     if let Some(path) = &args.cache_out {

@@ -147,7 +147,7 @@ impl HeldOut<'_> {
             let known = match read {
                 Read::Field(field) => {
                     let light = field.leaving(geometry, (x, &medium), -ray.direction);
-                    light.map(|light| light.value)
+                    light.map(|light| light.value.max(Vec3::ZERO))
                 }
                 Read::Multiple(cache) | Read::Sky(cache) => {
                     let lobe = self.for_whom.lobe(&medium, -ray.direction);

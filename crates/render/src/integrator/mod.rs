@@ -155,19 +155,27 @@ impl<'s> Renderer<'s> {
         let mut views: Vec<View> = Vec::new();
         for &camera in cameras {
             let view = View::new(camera, self.run.frame);
-            let has_begun = self.begun.contains(&view) && self.prepared.serves(&view);
-            let is_known = self.prepared.is_for(&view) || has_begun;
-            if !is_known && !views.contains(&view) {
+            if !views.contains(&view) {
                 views.push(view);
             }
         }
-        if views.is_empty() {
+        let is_served = |view: &View| self.prepared.serves(view);
+        let is_unknown = |view: &View| {
+            let has_begun = self.begun.contains(view) && is_served(view);
+            !(self.prepared.is_for(view) || has_begun)
+        };
+        if !views.iter().any(is_unknown) {
             return;
+        }
+        // For whom records are is chosen from all that are to share them.
+        if views.iter().all(is_served) {
+            views.retain(is_unknown);
         }
         let start = Instant::now();
         let prepared = std::mem::take(&mut self.prepared);
         self.prepared = self.pool.install(|| self.run.prepare_for(&views, prepared));
-        self.begun.extend(views);
+        let served = views.iter().filter(|view| self.prepared.serves(view));
+        self.begun.extend(served);
         self.fill_s += start.elapsed().as_secs_f64();
     }
 

@@ -182,7 +182,9 @@ impl Run<'_> {
         prepared.error = error.or(Some(self.error));
         // What the time limit ended is to be gone on with.
         if !prepared.lacks_records() {
-            prepared.views.extend(views);
+            let served = views.iter().filter(|view| prepared.serves(view));
+            let served: Vec<View> = served.copied().collect();
+            prepared.views.extend(served);
         }
         prepared
     }
@@ -277,8 +279,14 @@ impl Run<'_> {
         };
         let reach = self.reach(prepared.field.as_ref());
         let all_views = views;
-        if !views.iter().all(|view| prepared.serves(view)) {
-            (prepared.for_whom, prepared.eye) = self.for_whom(views);
+        let (for_whom, eye) = self.for_whom(views);
+        let is_served = |view: &View| prepared.serves(view);
+        // One eye after the other, where records cannot be for all.
+        let stays =
+            views.iter().all(is_served) || (for_whom == For::Eye && views.iter().any(is_served));
+        if !stays {
+            (prepared.for_whom, prepared.eye) = (for_whom, eye);
+            prepared.views.clear();
             for filled in [&mut prepared.multiple, &mut prepared.sky] {
                 *filled = filled.take().map(|_| Filled::empty());
             }

@@ -107,10 +107,11 @@ impl For {
         if is_one || scene.media.is_isotropic() {
             return Self::Eye;
         }
-        // Incident light was scattered before: what is left out counts by the square of its moment, for each of the band's functions.
+        // What is left out counts for each of the band's functions, by the square of its moment where the light was scattered before.
+        let times = if scene.lights.has_even_skies() { 1 } else { 2 };
         let is_enough = |order: &usize| {
             let unheld = scene.media.largest_moment(order + 1);
-            (2 * order + 3) as f32 * unheld * unheld <= UNHELD * error
+            (2 * order + 3) as f32 * unheld.powi(times) <= UNHELD * error
         };
         (1..=MOST_ORDER)
             .find(is_enough)
