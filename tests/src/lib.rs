@@ -6,6 +6,7 @@ pub mod golden;
 pub mod image;
 pub mod program;
 pub mod readers;
+pub mod room;
 
 /// Compiles and runs the example of the workspace's README.
 #[cfg(doctest)]

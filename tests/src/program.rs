@@ -62,18 +62,24 @@ pub fn run_line(folder: &Path, arguments: &str) -> Output {
     run_tyndall(folder, &arguments.split(' ').collect::<Vec<_>>())
 }
 
+/// As [`run_line`]: exit status and standard error.
+pub fn ends(folder: &Path, arguments: &str) -> (Option<i32>, String) {
+    told(run_line(folder, arguments))
+}
+
+/// Exit status and standard error of a program that has ended.
+pub fn told(output: Output) -> (Option<i32>, String) {
+    let stderr = String::from_utf8(output.stderr).expect("programs write UTF-8");
+    (output.status.code(), stderr)
+}
+
 /// As [`run_line`], for a command that must succeed; its standard error.
 ///
 /// # Panics
 /// If it does not, with what it said.
 pub fn succeed(folder: &Path, arguments: &str) -> String {
-    let output = run_line(folder, arguments);
-    let stderr = String::from_utf8(output.stderr).expect("tyndall writes UTF-8");
-    assert!(
-        output.status.success(),
-        "tyndall {arguments}: {}\n{stderr}",
-        output.status
-    );
+    let (status, stderr) = ends(folder, arguments);
+    assert_eq!(status, Some(0), "tyndall {arguments}\n{stderr}");
     stderr
 }
 

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use tyndall_tests::image::Image;
-use tyndall_tests::program::run_line;
+use tyndall_tests::program::{ends, run_line};
 
 /// A scene that renders; the cases break it.
 const SCENE: &str = r#"Scene(
@@ -70,10 +70,9 @@ const RENDER: &str = "render scene.ron -o out.exr --spp 1 --quiet";
 
 /// Runs `arguments` in `folder`; they must be refused, with the message of the snapshot `name`.
 fn refused(name: &str, folder: &Path, arguments: &str) {
-    let output = run_line(folder, arguments);
-    let message = String::from_utf8(output.stderr).unwrap();
+    let (status, message) = ends(folder, arguments);
     let message = message.replace(&folder.display().to_string(), "[folder]");
-    assert_eq!(output.status.code(), Some(2), "{name}: {message}");
+    assert_eq!(status, Some(2), "{name}: {message}");
     assert!(!message.contains("internal error"), "{name}: {message}");
     assert!(!folder.join("out.exr").exists(), "{name}: left an image");
     insta::assert_snapshot!(name, message);

@@ -6,7 +6,8 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use tyndall_tests::image::Channels;
-use tyndall_tests::program::{self, run_line};
+use tyndall_tests::program::{self, ends, run_line};
+use tyndall_tests::room::room;
 
 /// A box of fog with a wall, lit by a lamp and a sky: records of multiple scattering, of the sky and on surfaces.
 const ROOM: &str = r#"Scene(
@@ -24,60 +25,12 @@ const ROOM: &str = r#"Scene(
     render: Render(error: 0.2),
 )"#;
 
-/// A floor of four metres and a wall on it.
-fn room() -> String {
-    let corners: [[f32; 3]; 8] = [
-        [-2.0, 0.0, -2.0],
-        [2.0, 0.0, -2.0],
-        [2.0, 0.0, 2.0],
-        [-2.0, 0.0, 2.0],
-        [-0.5, 0.0, -0.5],
-        [0.5, 0.0, -0.5],
-        [0.5, 1.2, -0.5],
-        [-0.5, 1.2, -0.5],
-    ];
-    let indices: [u16; 12] = [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7];
-    let mut bytes: Vec<u8> = corners
-        .iter()
-        .flatten()
-        .flat_map(|c| c.to_le_bytes())
-        .collect();
-    bytes.extend(indices.iter().flat_map(|i| i.to_le_bytes()));
-    let hex = bytes.iter().map(|byte| format!("%{byte:02x}"));
-    serde_json::json!({
-        "asset": { "version": "2.0" },
-        "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0 }],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
-        "accessors": [
-            { "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 8, "min": [-2, 0, -2], "max": [2, 1.2, 2] },
-            { "bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": 12 },
-        ],
-        "bufferViews": [
-            { "buffer": 0, "byteLength": 96 },
-            { "buffer": 0, "byteOffset": 96, "byteLength": 24 },
-        ],
-        "buffers": [{
-            "byteLength": 120,
-            "uri": format!("data:application/octet-stream,{}", hex.collect::<String>()),
-        }],
-    })
-    .to_string()
-}
-
 /// A folder that holds the room.
 fn folder() -> TempDir {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("room.ron"), ROOM).unwrap();
     fs::write(folder.path().join("room.gltf"), room()).unwrap();
     folder
-}
-
-/// Runs `tyndall` with arguments separated by spaces; returns exit status and standard error.
-fn run(folder: &TempDir, arguments: &str) -> (Option<i32>, String) {
-    let output = run_line(folder.path(), arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    (output.status.code(), stderr)
 }
 
 fn succeed(folder: &TempDir, arguments: &str) {
@@ -159,7 +112,7 @@ fn a_file_that_is_not_the_scenes_whole_cache_is_refused() {
     let refused = |scene: &str, bytes: &[u8], message: &str, options: &str| {
         fs::write(file("other.cache"), bytes).unwrap();
         let command = format!("render {scene} --quiet -o x.exr --cache-in other.cache{options}");
-        let (status, stderr) = run(&folder, &command);
+        let (status, stderr) = ends(folder.path(), &command);
         assert_eq!(status, Some(2), "{message}: {stderr}");
         assert!(stderr.contains(message), "{message}: {stderr}");
         assert!(!file("x.exr").exists());
@@ -249,7 +202,10 @@ fn frames_do_not_depend_on_how_they_are_divided() {
 fn filling_that_the_time_limit_ends_is_gone_on_with() {
     let folder = folder();
     let records = |options: &str| {
-        let (status, stderr) = run(&folder, &format!("render room.ron --error 0.05 {options}"));
+        let (status, stderr) = ends(
+            folder.path(),
+            &format!("render room.ron --error 0.05 {options}"),
+        );
         assert_eq!(status, Some(0), "{stderr}");
         let output = run_line(folder.path(), "info room.cache --json");
         let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -314,7 +270,7 @@ fn places_far_apart_do_not_share_light() {
 #[test]
 fn a_sequence_needs_a_name_for_each_frame() {
     let folder = folder();
-    let (status, stderr) = run(&folder, "render room.ron --frames 0..2 -o x.exr");
+    let (status, stderr) = ends(folder.path(), "render room.ron --frames 0..2 -o x.exr");
     assert_eq!(status, Some(2));
     assert!(stderr.contains("####"), "{stderr}");
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 use tempfile::TempDir;
 use tyndall_tests::image::{Channels, Image};
-use tyndall_tests::program::{run_line, run_tyndall, succeed, workspace};
+use tyndall_tests::program::{ends, run_line, run_tyndall, succeed, workspace};
 
 /// The scene file of the contract, with numbers where it shows dots.
 const EVERY_FIELD: &str = r#"
@@ -236,9 +236,8 @@ fn the_pixels_do_not_depend_on_the_number_of_threads() {
 fn a_method_is_only_for_caching() {
     let folder = TempDir::new().unwrap();
     let arguments = "render scene.ron --integrator path --method jarosz08";
-    let output = run_line(folder.path(), arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    let (status, stderr) = ends(folder.path(), arguments);
+    assert_eq!(status, Some(2), "{stderr}");
     assert!(stderr.contains("--method"), "{stderr}");
 }
 

@@ -7,7 +7,7 @@ use tyndall_math::stats::Welford;
 use tyndall_render::image::Image;
 use tyndall_render::options::{Integrator, RenderOptions};
 use tyndall_scene::{LoadOptions, Scene, load_str};
-use tyndall_tests::program::{run_line, succeed};
+use tyndall_tests::program::{ends, succeed};
 
 const SEEDS: u64 = 6;
 const SIDE: usize = 12;
@@ -238,9 +238,8 @@ fn sequences_read_the_volume_file_of_their_frame() {
             "--frames 7..8",
         ),
     ] {
-        let output = run_line(folder.path(), &format!("{line} {options}"));
-        let message = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{message}");
+        let (status, message) = ends(folder.path(), &format!("{line} {options}"));
+        assert_eq!(status, Some(2), "{message}");
         assert!(message.contains(says), "{message}");
     }
 }

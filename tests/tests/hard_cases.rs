@@ -12,7 +12,8 @@ use tyndall_render::Outcome;
 use tyndall_render::options::{Integrator, RenderOptions};
 use tyndall_scene::{LoadOptions, load_str};
 use tyndall_tests::image::Channels;
-use tyndall_tests::program::{run_line, succeed, tyndall};
+use tyndall_tests::program::{ends, succeed, told, tyndall};
+use tyndall_tests::room::room;
 
 /// A lamp and a sky over a floor with a wall on it, in a box of fog that both cross; rows change parts of it.
 const SCENE: &str = r#"Scene(
@@ -47,40 +48,6 @@ type Check = fn(&Outcome);
 
 /// Number and name of a case, what it changes in [`SCENE`], and what must hold.
 type Row<'r> = (&'r str, &'r [(&'r str, &'r str)], Check);
-
-/// A floor of four metres and a wall on it, of bytes that the file itself holds.
-fn room() -> String {
-    let corners: [[f32; 3]; 8] = [
-        [-2.0, 0.0, -2.0],
-        [2.0, 0.0, -2.0],
-        [2.0, 0.0, 2.0],
-        [-2.0, 0.0, 2.0],
-        [-0.5, 0.0, -0.5],
-        [0.5, 0.0, -0.5],
-        [0.5, 1.2, -0.5],
-        [-0.5, 1.2, -0.5],
-    ];
-    let indices: [u16; 12] = [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7];
-    let bytes = corners.iter().flatten().flat_map(|c| c.to_le_bytes());
-    let bytes = bytes.chain(indices.iter().flat_map(|i| i.to_le_bytes()));
-    let hex: String = bytes.map(|byte| format!("%{byte:02x}")).collect();
-    serde_json::json!({
-        "asset": { "version": "2.0" },
-        "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0 }],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
-        "accessors": [
-            { "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 8, "min": [-2, 0, -2], "max": [2, 1.2, 2] },
-            { "bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": 12 },
-        ],
-        "bufferViews": [
-            { "buffer": 0, "byteLength": 96 },
-            { "buffer": 0, "byteOffset": 96, "byteLength": 24 },
-        ],
-        "buffers": [{ "byteLength": 120, "uri": format!("data:application/octet-stream,{hex}") }],
-    })
-    .to_string()
-}
 
 /// A `.vol` file of 4 × 4 × 4 cells in the cube from −1 to 1.
 fn vol(value: impl Fn(usize) -> f32) -> Vec<u8> {
@@ -311,8 +278,7 @@ const LAMP_ALONE: &str = "Scene(
 fn numbers_at_the_edge_of_options_are_taken_or_refused() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("s.ron"), LAMP_ALONE).unwrap();
-    let render =
-        |options: &str| run_line(folder.path(), &format!("render s.ron -o x.exr {options}"));
+    let render = |options: &str| ends(folder.path(), &format!("render s.ron -o x.exr {options}"));
     for options in [
         "--spp 1 --threads 64",
         "--spp 1 --seed 18446744073709551615",
@@ -322,9 +288,8 @@ fn numbers_at_the_edge_of_options_are_taken_or_refused() {
         "--spp 1 --width 1 --height 1",
         "--spp 1 --crop 7,5,1,1",
     ] {
-        let output = render(options);
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(0), "{options}: {stderr}");
+        let (status, stderr) = render(options);
+        assert_eq!(status, Some(0), "{options}: {stderr}");
         let pixels = Channels::read(&folder.path().join("x.exr")).unwrap();
         let pixels = pixels.rgb("").unwrap().pixels;
         assert!(pixels.iter().all(|p| p.is_finite()), "{options}");
@@ -341,9 +306,8 @@ fn numbers_at_the_edge_of_options_are_taken_or_refused() {
         "--error inf",
         "--checkpoint-interval -1",
     ] {
-        let output = render(options);
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{options}: {stderr}");
+        let (status, stderr) = render(options);
+        assert_eq!(status, Some(2), "{options}: {stderr}");
         assert!(!folder.path().join("x.exr").exists(), "{options}");
     }
 }
@@ -406,10 +370,7 @@ fn a_frame_larger_than_memory_is_refused_before_anything_is_computed() {
             .args(["-c", &line(options)])
             .current_dir(folder.path());
         let output = command.output().unwrap();
-        (
-            output.status.code(),
-            String::from_utf8(output.stderr).unwrap(),
-        )
+        told(output)
     };
     // Built before time counts.
     tyndall();

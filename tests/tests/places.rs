@@ -9,7 +9,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
-use tyndall_tests::program::{run_line, succeed, tyndall};
+use tyndall_tests::program::{ends, succeed, told, tyndall};
 
 /// A scene without records: its images take no time.
 const SCENE: &str = "Scene(
@@ -24,6 +24,18 @@ fn folder() -> TempDir {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("scene.ron"), SCENE).unwrap();
     folder
+}
+
+/// Runs `tyndall` where files may grow to so many blocks; tells exit status and standard error.
+fn on_full_disk(folder: &Path, blocks: u32, line: &str) -> (Option<i32>, String) {
+    // The signal that would end the program for it is ignored: writes fail as on a full disk.
+    let limited = format!(
+        "trap '' XFSZ; ulimit -f {blocks}; exec {} {line}",
+        tyndall().display()
+    );
+    let mut command = Command::new("sh");
+    command.args(["-c", &limited]).current_dir(folder);
+    told(command.stdin(Stdio::null()).output().unwrap())
 }
 
 /// The names of what is in a folder.
@@ -68,9 +80,8 @@ fn places_that_cannot_be_written_to_are_refused_before_the_scene_is_read() {
             continue;
         }
         // A scene that is not there would be told of later.
-        let output = run_line(folder.path(), &format!("render gone.ron {line}"));
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{line}: {stderr}");
+        let (status, stderr) = ends(folder.path(), &format!("render gone.ron {line}"));
+        assert_eq!(status, Some(2), "{line}: {stderr}");
         assert!(stderr.contains(message), "{line}: {stderr}");
     }
     assert_eq!(names(folder.path()), before);
@@ -90,16 +101,9 @@ fn a_full_disk_leaves_what_was_there_and_nothing_half_written() {
         "-o new.exr",
         "-o x.exr --cache-out new.cache --max-depth none --error 0.5",
     ] {
-        // Files may grow to one block, and the signal that would end the program for it is ignored: writes fail as on a full disk.
-        let limited = format!(
-            "trap '' XFSZ; ulimit -f 1; exec {} {render} --seed 1 {outputs}",
-            tyndall().display()
-        );
-        let mut command = Command::new("sh");
-        command.args(["-c", &limited]).current_dir(folder.path());
-        let output = command.stdin(Stdio::null()).output().unwrap();
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(1), "{outputs}: {stderr}");
+        let line = format!("{render} --seed 1 {outputs}");
+        let (status, stderr) = on_full_disk(folder.path(), 1, &line);
+        assert_eq!(status, Some(1), "{outputs}: {stderr}");
         assert!(stderr.contains("writing failed"), "{outputs}: {stderr}");
         assert!(stderr.contains("untouched"), "{outputs}: {stderr}");
         assert_eq!(names(folder.path()), before, "{outputs}");
@@ -110,15 +114,9 @@ fn a_full_disk_leaves_what_was_there_and_nothing_half_written() {
 #[test]
 fn a_checkpoint_that_cannot_be_written_is_a_warning() {
     let folder = folder();
-    let limited = format!(
-        "trap '' XFSZ; ulimit -f 60; exec {} render scene.ron --spp 600 -o x.png --checkpoint-interval 0",
-        tyndall().display()
-    );
-    let mut command = Command::new("sh");
-    command.args(["-c", &limited]).current_dir(folder.path());
-    let output = command.stdin(Stdio::null()).output().unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let line = "render scene.ron --spp 600 -o x.png --checkpoint-interval 0";
+    let (status, stderr) = on_full_disk(folder.path(), 60, line);
+    assert_eq!(status, Some(0), "{stderr}");
     assert!(stderr.contains("no checkpoint can be kept"), "{stderr}");
     assert_eq!(names(folder.path()), ["scene.ron", "x.png"]);
 }
@@ -163,9 +161,8 @@ fn every_kind_of_file_that_a_scene_names_is_sought_in_its_folder_alone() {
                 _ => with_gltf(mesh(TRIANGLE, &format!("{{\"uri\": \"{name}\"}}"))),
             };
             fs::write(at("scenes/scene.ron"), scene).unwrap();
-            let output = run_line(folder.path(), "render scenes/scene.ron -o x.exr --spp 1");
-            let stderr = String::from_utf8(output.stderr).unwrap();
-            assert_eq!(output.status.code(), Some(2), "{kind} {name}: {stderr}");
+            let (status, stderr) = ends(folder.path(), "render scenes/scene.ron -o x.exr --spp 1");
+            assert_eq!(status, Some(2), "{kind} {name}: {stderr}");
             assert!(stderr.contains(message), "{kind} {name}: {stderr}");
             assert!(!stderr.contains("root:x"), "{kind} {name}: {stderr}");
         }

@@ -13,7 +13,7 @@ use tyndall_render::image::Image;
 use tyndall_render::options::{Crop, Depth, Integrator, Phase, Progress, RenderOptions};
 use tyndall_scene::{LoadOptions, Scene};
 use tyndall_tests::image::Channels;
-use tyndall_tests::program::{run_line, signal, start_line, succeed, workspace};
+use tyndall_tests::program::{ends, signal, start_line, succeed, told, workspace};
 
 /// Cancels the render after so many rows of pixels.
 struct Rows(AtomicI64);
@@ -169,9 +169,8 @@ fn a_checkpoint_of_something_else_is_refused_with_what_differs() {
     let whole = fs::read(&path).unwrap();
     let refused = |line: &str, bytes: &[u8], message: &str| {
         fs::write(&path, bytes).unwrap();
-        let output = run_line(folder.path(), &format!("{line} --resume"));
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{message}: {stderr}");
+        let (status, stderr) = ends(folder.path(), &format!("{line} --resume"));
+        assert_eq!(status, Some(2), "{message}: {stderr}");
         assert!(stderr.contains(message), "{message}: {stderr}");
         assert!(
             fs::read(&path).unwrap() == bytes,
@@ -231,9 +230,8 @@ fn a_walk_that_a_signal_ends_goes_on_with_the_frame_under_way() {
         sleep(Duration::from_millis(5));
     }
     signal(&program, "TERM");
-    let output = program.wait_with_output().unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(143), "{stderr}");
+    let (status, stderr) = told(program.wait_with_output().unwrap());
+    assert_eq!(status, Some(143), "{stderr}");
     assert!(stderr.contains("--resume goes on"), "{stderr}");
     let said = succeed(folder.path(), &format!("{} --resume", line("parts")));
     assert!(said.contains("going on from"), "{said}");

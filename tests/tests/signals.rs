@@ -9,7 +9,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tyndall_tests::image::Channels;
-use tyndall_tests::program::{run_line, signal, start_line, workspace};
+use tyndall_tests::program::{run_line, signal, start_line, told, workspace};
 
 /// A render that takes hours, until a signal ends it.
 fn render(options: &str) -> String {
@@ -33,8 +33,7 @@ fn end(program: Child) -> (Option<i32>, String) {
     let output = program.wait_with_output().unwrap();
     // A pass takes some tenths of a second; the rest is for machines with other work to do.
     assert!(begun.elapsed().as_secs() < 20, "it goes on");
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    (output.status.code(), stderr)
+    told(output)
 }
 
 fn assert_shows_something(path: &Path) {

@@ -300,11 +300,8 @@ pub fn multiple_towards<G: Geometry, L: Lights>(
     reach: Reach<'_>,
     key: Key,
 ) -> Gathered {
-    let leaving = towards.map(|towards| towards.from(x));
-    let directions = GatherDirections::new(world, x, leaving.map(|(w_o, _)| w_o));
-    let from = (x, directions, leaving.map_or(0.0, |(_, rate)| rate));
-    let what = What::Scattered(reach);
-    gather(world, from, pattern, derivatives, what, key, |_, _| {})
+    let what = (What::Scattered(reach), derivatives);
+    gather_towards(world, x, towards, what, pattern, key)
 }
 
 /// Which light is gathered.
@@ -347,11 +344,21 @@ pub fn towards<G: Geometry, L: Lights>(
     pattern: &GatherPattern,
     key: Key,
 ) -> Gathered {
+    gather_towards(world, x, towards, (what, Derivatives::Aware), pattern, key)
+}
+
+fn gather_towards<G: Geometry, L: Lights>(
+    world: &World<'_, G, L>,
+    x: Vec3,
+    towards: Option<Towards>,
+    (what, derivatives): (What<'_>, Derivatives),
+    pattern: &GatherPattern,
+    key: Key,
+) -> Gathered {
     let leaving = towards.map(|towards| towards.from(x));
     let directions = GatherDirections::of(world, x, leaving.map(|(w_o, _)| w_o), what);
     let from = (x, directions, leaving.map_or(0.0, |(_, rate)| rate));
-    let aware = Derivatives::Aware;
-    gather(world, from, pattern, aware, what, key, |_, _| {})
+    gather(world, from, pattern, derivatives, what, key, |_, _| {})
 }
 
 /// Gathers light, and lets `see` each direction with what comes from there, whose mean over all rays is the value.
@@ -482,15 +489,15 @@ fn random_rotation(sampler: &mut Sampler) -> [f32; 3] {
     [u, v, sampler.next_1d()]
 }
 
-/// One path's estimate of (1/4π) ∫ L dω at `x`, light straight from emitters left out: what a record there would hold, unbiased
-/// and with the noise of a single path. All directions weigh alike.
+/// One path's estimate of ∫ p L dω for light that leaves `x` in the unit direction `w_o`, light straight from emitters left out: what a
+/// record there would hold, unbiased and with the noise of a single path.
 pub fn one<G: Geometry, L: Lights>(
     world: &World<'_, G, L>,
-    x: Vec3,
+    (x, w_o): (Vec3, Vec3),
     reach: Reach<'_>,
     sampler: &mut Sampler,
 ) -> Vec3 {
-    let directions = GatherDirections::new(world, x, None);
+    let directions = GatherDirections::new(world, x, Some(w_o));
     one_of(&directions, world, x, reach, sampler)
 }
 

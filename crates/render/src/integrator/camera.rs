@@ -11,10 +11,11 @@ use crate::film::Pixel;
 use glam::Vec3;
 use std::cell::Cell;
 use tyndall_math::{Ray, Sampler};
+use tyndall_media::MediumPoint;
 use tyndall_scene::{LightSet, Scene};
 use tyndall_transport::field::Field;
 use tyndall_transport::free_flight::FreeFlight;
-use tyndall_transport::gather::{self, GatherDirections};
+use tyndall_transport::gather;
 use tyndall_transport::layers::LayerVisitor;
 use tyndall_transport::path::{FirstEvent, Reach, Start, trace};
 use tyndall_transport::shafts::Shafts;
@@ -174,6 +175,9 @@ impl<'s> Camera<'s> {
             return pixel;
         }
         let w_o = -ray.direction;
+        let trace = |x, _: &MediumPoint<'_>, path: &mut Sampler| {
+            gather::one(&world, (x, w_o), self.reach, path)
+        };
         let sampler = &mut sampler.branch(FOG_PART);
         if let Some(e) = emission::sample(&world, &ray, &flight, sampler.next_1d()) {
             pixel.emission = e.value;
@@ -188,23 +192,23 @@ impl<'s> Camera<'s> {
             match known.multiple {
                 Multiple::None => {}
                 Multiple::Records(cache) => {
-                    let trace = |x, path: &mut Sampler| self.gathered(&world, (x, w_o), path);
                     pixel.multiple =
                         self.interpolated((&ray, &flight), (cache, known.for_whom), sampler, trace);
                 }
                 Multiple::Field(field) => {
-                    let read = |x, _, path: &mut Sampler| {
-                        let medium = world.media.at(x);
-                        let known = field.leaving(world.geometry, (x, &medium), w_o);
+                    let read = |(x, _), medium: &MediumPoint<'_>, path: &mut Sampler| {
+                        let known = field.leaving(world.geometry, (x, medium), w_o);
                         known.map_or_else(
-                            || self.gathered(&world, (x, w_o), path),
+                            || trace(x, medium, path),
                             |light| light.value.max(Vec3::ZERO),
                         )
                     };
                     pixel.multiple = self.scattered(&ray, &flight, sampler, read);
                 }
                 Multiple::Paths => {
-                    let read = |x, _, path: &mut Sampler| self.gathered(&world, (x, w_o), path);
+                    let read = |(x, _), medium: &MediumPoint<'_>, path: &mut Sampler| {
+                        trace(x, medium, path)
+                    };
                     pixel.multiple = self.scattered(&ray, &flight, sampler, read);
                 }
             }
@@ -224,7 +228,9 @@ impl<'s> Camera<'s> {
             return Vec3::ZERO;
         }
         let sampler = &mut sampler.branch(FOG_PART);
-        let read = |x, _, sampler: &mut Sampler| from_sky(&world, (x, -ray.direction), sampler);
+        let read = |(x, _), medium: &MediumPoint<'_>, sampler: &mut Sampler| {
+            from_sky(&world, x, (medium, -ray.direction), sampler)
+        };
         self.scattered(&ray, &flight, sampler, read)
     }
 
@@ -295,17 +301,6 @@ impl<'s> Camera<'s> {
             })
     }
 
-    /// In-scattered radiance at `x` towards `w_o` of light scattered before, by one path.
-    fn gathered(
-        &self,
-        world: &World<'_, Counted<'_>, LightSet>,
-        (x, w_o): (Vec3, Vec3),
-        path: &mut Sampler,
-    ) -> Vec3 {
-        let directions = GatherDirections::new(world, x, Some(w_o));
-        gather::one_of(&directions, world, x, self.reach, path)
-    }
-
     fn traced(
         &self,
         ray: &Ray,
@@ -339,7 +334,9 @@ impl<'s> Camera<'s> {
     ) -> Vec3 {
         if let Some(cache) = known.single {
             let sampler = &mut sampler.branch(SINGLE_PART);
-            let trace = |x, sampler: &mut Sampler| from_lights(world, (x, -ray.direction), sampler);
+            let trace = |x, medium: &MediumPoint<'_>, sampler: &mut Sampler| {
+                from_lights(world, x, (medium, -ray.direction), sampler)
+            };
             let cache = (cache, known.for_whom);
             return self.interpolated((ray, flight), cache, sampler, trace);
         }
@@ -350,7 +347,9 @@ impl<'s> Camera<'s> {
         if let Some(cache) = known.sky {
             lights.take_sky(world.lights);
             let sampler = &mut sampler.branch(SKY_PART);
-            let trace = |x, sampler: &mut Sampler| from_sky(world, (x, -ray.direction), sampler);
+            let trace = |x, medium: &MediumPoint<'_>, sampler: &mut Sampler| {
+                from_sky(world, x, (medium, -ray.direction), sampler)
+            };
             let cache = (cache, known.for_whom);
             shafts += self.interpolated((ray, flight), cache, sampler, trace);
         }
@@ -375,13 +374,14 @@ impl<'s> Camera<'s> {
         shafts + sum / SINGLE_SAMPLES as f32
     }
 
-    /// Light scattered in media towards the origin of `ray`, where `read` knows in-scattered radiance at a place and its distance.
+    /// Light scattered in media towards the origin of `ray`, where `read` knows in-scattered radiance at a place and its distance, in the
+    /// medium there.
     fn scattered(
         &self,
         ray: &Ray,
         flight: &FreeFlight<'_>,
         sampler: &mut Sampler,
-        read: impl Fn(Vec3, f32, &mut Sampler) -> Vec3,
+        read: impl Fn((Vec3, f32), &MediumPoint<'_>, &mut Sampler) -> Vec3,
     ) -> Vec3 {
         let media = &self.scene.media;
         let offset = sampler.next_1d();
@@ -391,9 +391,10 @@ impl<'s> Camera<'s> {
                 continue;
             };
             let x = ray.at(t);
-            let radiance = read(x, t, &mut sampler.branch(u64::from(i)));
+            let medium = media.at(x);
+            let radiance = read((x, t), &medium, &mut sampler.branch(u64::from(i)));
             let stop = flight.stop(t);
-            sum += stop.transmittance * media.at(x).sigma_s * radiance / flight.pdf_inside(&stop);
+            sum += stop.transmittance * medium.sigma_s * radiance / flight.pdf_inside(&stop);
         }
         sum / MEDIA_SAMPLES as f32
     }
@@ -404,40 +405,40 @@ impl<'s> Camera<'s> {
         (ray, flight): (&Ray, &FreeFlight<'_>),
         (cache, for_whom): (&MediaCache, For),
         sampler: &mut Sampler,
-        trace: impl Fn(Vec3, &mut Sampler) -> Vec3,
+        trace: impl Fn(Vec3, &MediumPoint<'_>, &mut Sampler) -> Vec3,
     ) -> Vec3 {
-        self.scattered(ray, flight, sampler, |x, t, sampler| {
+        self.scattered(ray, flight, sampler, |(x, t), medium, sampler| {
             self.lookups.set(self.lookups.get() + 1);
-            let lobe = for_whom.lobe(&self.scene.media.at(x), -ray.direction);
+            let lobe = for_whom.lobe(medium, -ray.direction);
             media::lookup(cache, x, lobe.as_ref()).unwrap_or_else(|| {
                 self.missed.set(self.missed.get() + 1);
                 // The nearest record is a little off here, and a path would be noisy.
                 media::nearest(cache, x, lobe.as_ref(), MAKESHIFT * t)
-                    .unwrap_or_else(|| trace(x, sampler))
+                    .unwrap_or_else(|| trace(x, medium, sampler))
             })
         })
     }
 }
 
-/// In-scattered radiance at `x` towards `w_o` of light straight from all lights.
+/// In-scattered radiance at `x` in `medium` towards `w_o` of light straight from all lights.
 fn from_lights(
     world: &World<'_, Counted<'_>, LightSet>,
-    (x, w_o): (Vec3, Vec3),
+    x: Vec3,
+    (medium, w_o): (&MediumPoint<'_>, Vec3),
     sampler: &mut Sampler,
 ) -> Vec3 {
     let (choice, u) = (sampler.next_1d(), sampler.next_2d());
-    let medium = world.media.at(x);
     let sample = direct::sample(world, x, None, choice, u);
     sample.map_or(Vec3::ZERO, |s| medium.phase(w_o, s.w_i).value * s.radiance)
 }
 
-/// In-scattered radiance at `x` towards `w_o` of light straight from skies.
+/// In-scattered radiance at `x` in `medium` towards `w_o` of light straight from skies.
 fn from_sky(
     world: &World<'_, Counted<'_>, LightSet>,
-    (x, w_o): (Vec3, Vec3),
+    x: Vec3,
+    (medium, w_o): (&MediumPoint<'_>, Vec3),
     sampler: &mut Sampler,
 ) -> Vec3 {
-    let medium = world.media.at(x);
     let samples = direct::sky(world, x, None, sampler.next_2d());
     samples
         .map(|s| medium.phase(w_o, s.w_i).value * s.radiance)

@@ -18,7 +18,7 @@ use tyndall_scene::Camera;
 
 const FORMAT: Format = Format {
     magic: *b"TYNDALLr",
-    version: 1,
+    version: 2,
 };
 /// Time between checkpoints over what it takes to write one, at least.
 const SPARSE: u32 = 20;

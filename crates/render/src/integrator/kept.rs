@@ -15,7 +15,7 @@ use std::path::Path;
 
 const FORMAT: Format = Format {
     magic: *b"TYNDALLc",
-    version: 2,
+    version: 3,
 };
 
 /// What a cache file holds.

@@ -159,7 +159,7 @@ impl<'s> Renderer<'s> {
                 views.push(view);
             }
         }
-        let is_served = |view: &View| self.prepared.serves(view);
+        let is_served = |view: &View| self.prepared.for_whom.serves(view);
         let is_unknown = |view: &View| {
             let has_begun = self.begun.contains(view) && is_served(view);
             !(self.prepared.is_for(view) || has_begun)
@@ -174,8 +174,7 @@ impl<'s> Renderer<'s> {
         let start = Instant::now();
         let prepared = std::mem::take(&mut self.prepared);
         self.prepared = self.pool.install(|| self.run.prepare_for(&views, prepared));
-        let served = views.iter().filter(|view| self.prepared.serves(view));
-        self.begun.extend(served);
+        self.begun.extend(self.prepared.for_whom.served(&views));
         self.fill_s += start.elapsed().as_secs_f64();
     }
 

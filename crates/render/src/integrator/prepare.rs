@@ -14,7 +14,6 @@ use super::view::View;
 use super::{FIELD_DEADLINE, FILL_DEADLINE, Run, Way, field, has_passed, is_lit};
 use crate::options::MultipleFrom;
 use crate::stats::Stats;
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use tyndall_transport::gather::What;
 use tyndall_transport::path::Reach;
@@ -35,9 +34,8 @@ pub(super) struct Prepared {
     /// Whether camera rays read multiple scattering from the field itself.
     pub(super) reads_field: bool,
     pub(super) multiple: Option<Filled<media::Known>>,
-    /// For whom records of light in media are, and the one eye, where they are for one.
+    /// For whom records of light in media are.
     pub(super) for_whom: For,
-    eye: Option<Vec3>,
     /// Single scattering of light from skies.
     pub(super) sky: Option<Filled<media::Known>>,
     /// Single scattering of all light.
@@ -117,12 +115,7 @@ impl Prepared {
 
     /// Whether it was computed for this view.
     pub(super) fn is_for(&self, view: &View) -> bool {
-        self.views.contains(view) && self.serves(view)
-    }
-
-    /// Whether its records in media, if they are for one eye alone, are for that of `view`.
-    pub(super) fn serves(&self, view: &View) -> bool {
-        self.eye.is_none_or(|eye| eye == view.eye())
+        self.views.contains(view) && self.for_whom.serves(view)
     }
 
     /// Adds all records to a map of them.
@@ -182,9 +175,7 @@ impl Run<'_> {
         prepared.error = error.or(Some(self.error));
         // What the time limit ended is to be gone on with.
         if !prepared.lacks_records() {
-            let served = views.iter().filter(|view| prepared.serves(view));
-            let served: Vec<View> = served.copied().collect();
-            prepared.views.extend(served);
+            prepared.views.extend(prepared.for_whom.served(views));
         }
         prepared
     }
@@ -196,14 +187,13 @@ impl Run<'_> {
         if way != Way::Records && !holds_surfaces {
             return Prepared::default();
         }
-        let (for_whom, eye) = self.for_whom(views);
+        let for_whom = For::views(self.scene, views, self.error);
         let mut prepared = Prepared {
             for_whom,
-            eye,
             ..Prepared::default()
         };
         let all_views = views;
-        let views = &self.seen_from(eye, views)[..];
+        let views = &for_whom.served(views)[..];
         let field = self.has_field().then(|| self.field(all_views));
         let reach = self.reach(field.as_ref());
         let pilot = self.pilot(views, reach);
@@ -279,19 +269,19 @@ impl Run<'_> {
         };
         let reach = self.reach(prepared.field.as_ref());
         let all_views = views;
-        let (for_whom, eye) = self.for_whom(views);
-        let is_served = |view: &View| prepared.serves(view);
+        let for_whom = For::views(self.scene, views, self.error);
+        let is_served = |view: &View| prepared.for_whom.serves(view);
         // One eye after the other, where records cannot be for all.
-        let stays =
-            views.iter().all(is_served) || (for_whom == For::Eye && views.iter().any(is_served));
+        let stays = views.iter().all(is_served)
+            || (matches!(for_whom, For::Eye(_)) && views.iter().any(is_served));
         if !stays {
-            (prepared.for_whom, prepared.eye) = (for_whom, eye);
+            prepared.for_whom = for_whom;
             prepared.views.clear();
             for filled in [&mut prepared.multiple, &mut prepared.sky] {
                 *filled = filled.take().map(|_| Filled::empty());
             }
         }
-        let views = &self.seen_from(prepared.eye, views)[..];
+        let views = &prepared.for_whom.served(views)[..];
         if let Some(filled) = prepared.multiple.take() {
             let what = (What::Scattered(reach), prepared.for_whom);
             let kind = self.media(views, what, plan.multiple);
@@ -307,19 +297,6 @@ impl Run<'_> {
         }
         prepared.deadline_passed = has_passed(self.deadline(FILL_DEADLINE));
         prepared
-    }
-
-    /// For whom records of light in media are to be, and the one eye, where they are for one.
-    fn for_whom(&self, views: &[View]) -> (For, Option<Vec3>) {
-        let for_whom = For::views(self.scene, views, self.error);
-        let is_one = for_whom == For::Eye && !self.scene.media.is_isotropic();
-        (for_whom, is_one.then(|| views[0].eye()))
-    }
-
-    /// Those of `views` that are seen from one `eye`, if it has to be one.
-    fn seen_from(&self, eye: Option<Vec3>, views: &[View]) -> Vec<View> {
-        let is_seen = |view: &&View| eye.is_none_or(|eye| eye == view.eye());
-        views.iter().filter(is_seen).copied().collect()
     }
 
     /// Whether paths end in a coarse field: where they may be long, and scatter in media as a field knows it.
@@ -404,7 +381,7 @@ impl Run<'_> {
             },
             sky: None,
             single: None,
-            for_whom: For::Eye,
+            for_whom: For::Any,
             indirect: None,
         };
         let camera = |view| Camera::new(self.scene, view, reach);

@@ -5,7 +5,7 @@
 use super::{Field, FieldLight, Part};
 use crate::direct;
 use crate::free_flight::FreeFlight;
-use crate::gather::{self, GatherDirections};
+use crate::gather;
 use crate::path::{Reach, Source, Vertex, Visitor, source};
 use crate::single::SegmentLight;
 use crate::world::{Geometry, Lights, SurfaceHit, World};
@@ -30,9 +30,8 @@ fn traced<G: Geometry, L: Lights>(
     };
     // Direct light is asked for only where media scatter alike in all directions.
     let direct = direct.map_or(Vec3::ZERO, |s| s.radiance * (0.25 * FRAC_1_PI));
-    let directions = GatherDirections::new(world, x, Some(w_o));
     FieldLight {
-        value: direct + gather::one_of(&directions, world, x, Reach::default(), &mut sampler),
+        value: direct + gather::one(world, (x, w_o), Reach::default(), &mut sampler),
         gradient: [Vec3::ZERO; 3],
     }
 }

@@ -8,7 +8,8 @@ use super::{
 };
 use crate::integrator::view::spread;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::sync::Arc;
 use tyndall_cache::{Cache, Record, weight};
 use tyndall_math::{Key, Ray, Sampler, warp};
@@ -69,43 +70,34 @@ impl Known {
 }
 
 /// For whom records are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(try_from = "usize", into = "usize")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub(in crate::integrator) enum For {
-    /// The one eye of the views they are made for, or any where media scatter alike in all directions.
+    /// All eyes, as media scatter alike in all directions.
     #[default]
-    Eye,
+    Any,
+    /// The eye at one place.
+    Eye(Vec3),
     /// All eyes, by directions of light up to this band.
-    All(usize),
+    All(#[serde(deserialize_with = "order")] usize),
 }
 
-impl TryFrom<usize> for For {
-    type Error = &'static str;
-
-    fn try_from(order: usize) -> Result<Self, &'static str> {
-        match order {
-            0 => Ok(Self::Eye),
-            1..=MOST_ORDER => Ok(Self::All(order)),
-            _ => Err("directions of light have more bands than there may be"),
-        }
-    }
-}
-
-impl From<For> for usize {
-    fn from(for_whom: For) -> Self {
-        match for_whom {
-            For::Eye => 0,
-            For::All(order) => order,
-        }
-    }
+/// The highest band of directions, as far as there may be one.
+fn order<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    let order = usize::deserialize(deserializer)?;
+    let is_held = (1..=MOST_ORDER).contains(&order);
+    let fault = || D::Error::custom("directions of light have more bands than there may be");
+    is_held.then_some(order).ok_or_else(fault)
 }
 
 impl For {
-    /// The cheapest way that keeps the `error` of scattered light for `views`.
+    /// The cheapest way that keeps the `error` of scattered light for `views`; where that is for one eye, it is that of the first.
     pub(in crate::integrator) fn views(scene: &Scene, views: &[View], error: f32) -> Self {
-        let is_one = views.iter().all(|view| view.eye() == views[0].eye());
-        if is_one || scene.media.is_isotropic() {
-            return Self::Eye;
+        if scene.media.is_isotropic() {
+            return Self::Any;
+        }
+        let eye = views[0].eye();
+        if views.iter().all(|view| view.eye() == eye) {
+            return Self::Eye(eye);
         }
         // What is left out counts for each of the band's functions, by the square of its moment where the light was scattered before.
         let times = if scene.lights.has_even_skies() { 1 } else { 2 };
@@ -115,13 +107,27 @@ impl For {
         };
         (1..=MOST_ORDER)
             .find(is_enough)
-            .map_or(Self::Eye, Self::All)
+            .map_or(Self::Eye(eye), Self::All)
+    }
+
+    /// Whether records for it are for the eye of `view`.
+    pub(in crate::integrator) fn serves(self, view: &View) -> bool {
+        match self {
+            Self::Any | Self::All(_) => true,
+            Self::Eye(eye) => eye == view.eye(),
+        }
+    }
+
+    /// Those of `views` that records for it serve.
+    pub(in crate::integrator) fn served(self, views: &[View]) -> Vec<View> {
+        let is_served = |view: &&View| self.serves(view);
+        views.iter().filter(is_served).copied().collect()
     }
 
     /// What the light of records is for a place in `medium` and the direction `w_o`.
     pub(in crate::integrator) fn lobe(self, medium: &MediumPoint<'_>, w_o: Vec3) -> Option<Lobe> {
         match self {
-            Self::Eye => None,
+            Self::Any | Self::Eye(_) => None,
             Self::All(order) => Some(Lobe::new(medium, w_o, order)),
         }
     }
